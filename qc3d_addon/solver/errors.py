@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Typed errors: what is wrong, and what to do about it, in one sentence a person can act on."""
+
+from __future__ import annotations
+
+
+class QC3DError(Exception):
+    """Base of every error that QC3D raises on purpose; its text is meant for the user."""
+
+
+class InputError(QC3DError):
+    """The keys, the mesh or the settings cannot be used as they are."""
+
+
+class MeshingError(QC3DError):
+    """The cube could not be filled with tetrahedra."""
+
+
+class FitError(QC3DError):
+    """No fold-free map that carries the first key onto the second was found."""
+
+
+class ReconstructionError(QC3DError):
+    """A map cannot be rebuilt from its representation and boundary conditions."""

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The input of the solver: two keys of one mesh, checked once on the way in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import InputError
+from .tetmesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPair:
+    """Two shapes of one mesh. Build it with ``KeyPair.checked``, which validates.
+
+    Parameters
+    ----------
+    key0, key1 : (n, 3) float64
+        Vertex positions of the first and the second key, in the object's own units.
+    faces : (m, 3) int64
+        Triangles (polygons are triangulated before they come here); may be empty.
+    edges : (e, 2) int64
+        Edges to keep together that belong to no face; may be empty.
+    """
+
+    key0: Floats
+    key1: Floats
+    faces: Ints
+    edges: Ints
+
+    @classmethod
+    def checked(cls, key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None) -> KeyPair:
+        """Validate the arrays and make a pair of them.
+
+        Raises
+        ------
+        InputError
+            If shapes disagree, a coordinate is not finite, an index is out of range, there are fewer than four
+            vertices, or all vertices of a key lie in one plane, line or point.
+        """
+        first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
+        if first.shape != second.shape:
+            raise InputError(
+                f"The keys have {len(first)} and {len(second)} vertices; both must be shapes of the same mesh."
+            )
+        if len(first) < 4:
+            raise InputError(f"The mesh has {len(first)} vertices; at least 4 are needed to span a volume.")
+        for key, name in ((first, "first"), (second, "second")):
+            _require_volume(key, name)
+        triangles = _indices(faces, 3, len(first), "faces")
+        wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
+        return cls(first, second, triangles, wires)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the first key's bounding-box diagonal, the unit of relative errors."""
+        return float(np.linalg.norm(np.ptp(self.key0, axis=0)))
+
+
+def _positions(key: ArrayLike, name: str) -> Floats:
+    positions = np.array(key, dtype=np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise InputError(f"The {name} key has shape {positions.shape}; positions must be an (n, 3) array.")
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if bad.size:
+        raise InputError(
+            f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
+            f"({bad.size} such vertices); repair the key first."
+        )
+    return positions
+
+
+def _require_volume(key: Floats, name: str) -> None:
+    spread = key - key.mean(axis=0)
+    size = np.abs(spread).max()
+    thickness = 0.0 if size == 0.0 else np.linalg.svd(spread / size, compute_uv=False)[-1] / np.sqrt(len(key))
+    if thickness < 1e-9:
+        raise InputError(
+            f"All vertices of the {name} key lie in one plane, line or point; "
+            "in-betweens need a key that spans a volume."
+        )
+
+
+def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:
+    indices = np.array(values)
+    if indices.ndim != 2 or indices.shape[1] != width:
+        raise InputError(f"{name} has shape {indices.shape}; it must be an (m, {width}) array of vertex indices.")
+    if indices.size and indices.dtype.kind not in "iu":
+        raise InputError(f"{name} holds {indices.dtype} values; vertex indices must be integers.")
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        raise InputError(f"{name} refers to a vertex outside 0..{count - 1}.")
+    return np.ascontiguousarray(indices, dtype=np.int64)

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user may choose, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from .errors import InputError
+
+Mode = Literal["linear"]
+Engine = Literal["auto", "tetwild", "delaunay"]
+Quality = Literal["draft", "normal", "fine"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The choices of one bake.
+
+    Parameters
+    ----------
+    mode
+        How the map is interpolated: ``linear`` is the paper's scheme.
+    engine
+        What fills the cube: ``tetwild``, ``delaunay``, or ``auto`` (tetwild where it can run).
+    quality
+        How fine the volume is: ``draft``, ``normal`` or ``fine``.
+    seed
+        Seed of the random samples of the ``delaunay`` engine.
+    mesh_time_limit
+        Seconds after which a tetwild run is stopped.
+    """
+
+    mode: Mode = "linear"
+    engine: Engine = "auto"
+    quality: Quality = "normal"
+    seed: int = 0
+    mesh_time_limit: float = 120.0
+
+    def __post_init__(self) -> None:
+        for name, choices in (("mode", get_args(Mode)), ("engine", get_args(Engine)), ("quality", get_args(Quality))):
+            value = getattr(self, name)
+            if value not in choices:
+                raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
+        if not self.mesh_time_limit > 0.0:
+            raise InputError(f"The time limit of meshing is {self.mesh_time_limit} s; it must be positive.")

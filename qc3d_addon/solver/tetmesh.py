@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tetrahedral meshes of the unit cube: measures, gradients and topology."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import MeshingError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# Vertices of the face opposite to each corner, ordered so that the normal points out of a positive tetrahedron.
+OPPOSITE_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """A conforming tetrahedral mesh, every tetrahedron positively oriented.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        Vertex positions.
+    tets : (M, 4) int64
+        Corner indices; det(p1 - p0, p2 - p0, p3 - p0) > 0 for each row.
+    """
+
+    points: Floats
+    tets: Ints
+
+    @cached_property
+    def edge_matrices(self) -> Floats:
+        """(M, 3, 3): columns p1 - p0, p2 - p0, p3 - p0."""
+        return edge_matrices(self.points, self.tets)
+
+    @cached_property
+    def volumes(self) -> Floats:
+        """(M,): signed volumes, cube units."""
+        return np.linalg.det(self.edge_matrices) / 6.0
+
+    @cached_property
+    def gradients(self) -> Floats:
+        """(M, 4, 3): constant gradients of the four hat functions on each tetrahedron."""
+        inner = np.linalg.inv(self.edge_matrices)
+        return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+    @cached_property
+    def centroids(self) -> Floats:
+        """(M, 3): centroids of the tetrahedra."""
+        return self.points[self.tets].mean(axis=1)
+
+    @cached_property
+    def neighbours(self) -> Ints:
+        """(M, 4): the tetrahedron across the face opposite to each corner, -1 on the boundary.
+
+        Raises
+        ------
+        MeshingError
+            If a face belongs to more than two tetrahedra.
+        """
+        corners = np.sort(self.tets[:, OPPOSITE_FACES].reshape(-1, 3), axis=1)
+        order = np.lexsort(corners.T[::-1])
+        ordered = corners[order]
+        same = (ordered[1:] == ordered[:-1]).all(axis=1)
+        if (same[1:] & same[:-1]).any():
+            raise MeshingError("A face of the tetrahedral mesh belongs to more than two tetrahedra; mesh again.")
+        first, second = order[:-1][same], order[1:][same]
+        across = np.full(corners.shape[0], -1, dtype=np.int64)
+        across[first], across[second] = second // 4, first // 4
+        return across.reshape(-1, 4)
+
+    @cached_property
+    def boundary_faces(self) -> Ints:
+        """(F, 3): triangles on the boundary, normals pointing out."""
+        tet, corner = np.nonzero(self.neighbours < 0)
+        return self.tets[tet[:, None], OPPOSITE_FACES[corner]]
+
+    @cached_property
+    def on_cube_face(self) -> Bools:
+        """(N, 3): whether coordinate c of a vertex is exactly 0 or 1, that is, held by the sliding boundary."""
+        return (self.points == 0.0) | (self.points == 1.0)
+
+    def jacobians(self, values: Floats) -> Floats:
+        """(M, 3, 3) Jacobians of the piecewise linear map that sends ``points`` to ``values`` (N, 3)."""
+        return np.asarray(np.einsum("mka,mkb->mab", values[self.tets], self.gradients, optimize=True))
+
+
+def edge_matrices(points: Floats, tets: Ints) -> Floats:
+    """(M, 3, 3) matrices whose columns are the edges from corner 0 to corners 1, 2, 3."""
+    corners = points[tets]
+    return np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+#   make demo     bake the demo file; the results are left in demo/
+#   make test     everything: environment, ruff, mypy, pytest
+#   make assets   make the demo files again with the script that made them
+#
+# PYTHON=python3.13 chooses the interpreter; the default is the first of 3.11 and 3.13 that really runs.
+
+PYTHON ?= $(shell tools/find_python)
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+ifeq ($(VERSION),)
+$(error QC3D needs python3.11 or python3.13)
+endif
+VENV := .venv-$(VERSION)
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint assets clean
+
+demo: $(VENV)/installed
+	rm -rf demo && mkdir demo
+	$(BIN)/qc3d bake assets/limb.blend --object Arm --from Basis --to "Bend and twist" --frames 5 \
+	    --output demo/limb.blend --report demo/limb.json
+	$(BIN)/python tools/contact_sheet.py demo/limb.blend --object Arm --from Basis --to "Bend and twist" \
+	    --label "QC3D, mode linear" --output demo/limb.png
+	@echo "Look at demo/limb.png, open demo/limb.blend in Blender, read demo/limb.json."
+
+test: $(VENV)/installed lint
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/installed
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+assets: $(VENV)/installed
+	$(BIN)/python assets/make_assets.py
+
+$(VENV)/installed: pyproject.toml blender_manifest.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@$(BIN)/python -c 'import bpy' || { echo "Blender's Python module does not load; on Debian or Ubuntu:" \
+	    "apt-get install libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1"; exit 1; }
+	touch $@
+
+clean:
+	rm -rf .venv-* demo

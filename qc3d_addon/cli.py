@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command ``qc3d``: in-betweens without Blender's window."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from importlib import metadata
+from pathlib import Path
+from typing import NoReturn, get_args
+
+from .progress_bars import StageBars
+from .solver.array_files import read_pair, replacing, write_frames
+from .solver.errors import InputError, QC3DError
+from .solver.settings import Engine, Mode, Quality, Settings
+
+MOST_FRAMES = 10_000
+
+_DEFAULTS = Settings()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns
+    -------
+    0 when it is done; 2 when the input is not usable, with one sentence on standard error; 130 when interrupted.
+    """
+    try:
+        arguments = _parser().parse_args(argv)
+        arguments.run(arguments)
+    except QC3DError as error:
+        print(f"qc3d: {error}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print("qc3d: There is not enough memory; use fewer frames, a lower quality or a smaller mesh.", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _interpolate(arguments: argparse.Namespace) -> None:
+    from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
+
+    settings = _settings(arguments)
+    _require_distinct_files(arguments.pair, arguments.output, arguments.report)
+    pair = read_pair(arguments.pair, arguments.first, arguments.second)
+    with ExitStack() as stack:
+        output = stack.enter_context(replacing(arguments.output))
+        report = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
+        with StageBars() as bars:
+            prepared = finish(prepare(pair, settings), bars)
+            bake = finish(inbetweens(prepared, evenly_spaced(arguments.frames), settings), bars)
+        try:
+            write_frames(output, pair, bake.times, bake.frames)
+            if report is not None:
+                report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
+
+
+def _settings(arguments: argparse.Namespace) -> Settings:
+    return Settings(mode=arguments.mode, engine=arguments.engine, quality=arguments.quality, seed=arguments.seed)
+
+
+def _require_distinct_files(*paths: Path | None) -> None:
+    seen: dict[Path, Path] = {}
+    for path in paths:
+        if path is not None and seen.setdefault(path.resolve(), path) is not path:
+            raise InputError(f"{path} is named twice; input, output and report must be different files.")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="qc3d", description="In-betweens between two shapes of one mesh, through fold-free maps.")
+    parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    interpolate = commands.add_parser("interpolate", help="in-betweens of two shapes in an .npz file")
+    interpolate.add_argument(
+        "pair", type=Path, metavar="PAIR.npz", help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3)"
+    )
+    _add_keys(interpolate, "shape", "FRAMES.npz", "faces, frames (N + 2, n, 3), times, key0, key1")
+    _add_settings(interpolate)
+    interpolate.set_defaults(run=_interpolate)
+    return parser
+
+
+def _add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents: str) -> None:
+    command.add_argument("--from", dest="first", required=True, metavar="NAME", help=f"the {kind} to start from")
+    command.add_argument("--to", dest="second", required=True, metavar="NAME", help=f"the {kind} to end with")
+    command.add_argument("--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens")
+    command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
+    command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
+
+
+def _add_settings(command: argparse.ArgumentParser) -> None:
+    for name, choices, text in (
+        ("mode", get_args(Mode), "how the map is interpolated"),
+        ("engine", get_args(Engine), "what fills the volume around the mesh"),
+        ("quality", get_args(Quality), "how fine the volume is"),
+    ):
+        default = getattr(_DEFAULTS, name)
+        command.add_argument(f"--{name}", choices=choices, default=default, help=f"{text} (default: {default})")
+    command.add_argument(
+        "--seed", type=_seed, default=_DEFAULTS.seed, metavar="S", help="of the delaunay engine's samples (default: 0)"
+    )
+
+
+def _frame_count(text: str) -> int:
+    count = _whole_number(text)
+    if not 0 <= count <= MOST_FRAMES:
+        raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")
+    return count
+
+
+def _seed(text: str) -> int:
+    seed = _whole_number(text)
+    if seed < 0:
+        raise argparse.ArgumentTypeError(f"{text} is negative; a seed is 0 or more")
+    return seed
+
+
+def _whole_number(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _version() -> str:
+    try:
+        return metadata.version("qc3d")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one sentence; argparse alone would print the usage of the whole command before it."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a pair of keys needs only once: the mesh of the cube and the fold-free map fitted to the keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from .embedding import Embedding
+from .keypair import KeyPair
+from .location import interpolation_matrix
+from .rotations import determinants
+from .tetmesh import Floats, TetMesh
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMap:
+    """A fitted map of the cube, kept so that later bakes of the same keys skip meshing and fitting.
+
+    Parameters
+    ----------
+    pair : KeyPair
+    mesh : TetMesh
+        The filled unit cube.
+    mapped : (N, 3)
+        Values of the map at the mesh's vertices, cube units.
+    engine : str
+        The engine that made the mesh.
+    notes : tuple of str
+        Sentences for the user, such as why another engine ran.
+    seconds : dict
+        Time spent per stage.
+    """
+
+    pair: KeyPair
+    mesh: TetMesh
+    mapped: Floats
+    engine: str
+    notes: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def embedding(self) -> Embedding:
+        """The pair in cube units."""
+        return Embedding.of(self.pair)
+
+    @cached_property
+    def landmarks(self) -> csr_array:
+        """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
+        return interpolation_matrix(self.mesh, self.embedding.key0)
+
+    def folds(self, values: Floats) -> int:
+        """Tetrahedra that the map with these values (N, 3) does not keep positively oriented."""
+        return int((determinants(self.mesh.jacobians(values)) <= 0.0).sum())
+
+    def landmark_residual(self) -> dict[str, float]:
+        """Distance of the mapped landmarks from the second key: ``rms`` and ``max``, over the bounding-box diagonal."""
+        embedding = self.embedding
+        missed = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
+        missed /= self.pair.diagonal * embedding.scale
+        return {"rms": float(np.sqrt(embedding.weights @ missed**2)), "max": float(missed.max())}

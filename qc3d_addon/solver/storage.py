@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A prepared map as bytes: versioned, without pickles, checked on the way in."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+
+import numpy as np
+
+from .errors import InputError
+from .keypair import KeyPair
+from .prepared import PreparedMap
+from .rotations import determinants
+from .tetmesh import TetMesh
+
+FORMAT_VERSION = 1
+_DAMAGED = "The stored map is damaged; prepare the keys again."
+
+
+def fingerprint(pair: KeyPair) -> str:
+    """A digest of the keys, faces and edges: a stored map belongs to keys with the same digest."""
+    digest = hashlib.sha256()
+    for array in (pair.key0, pair.key1, pair.faces, pair.edges):
+        digest.update(np.int64(len(array)).tobytes())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def to_bytes(prepared: PreparedMap) -> bytes:
+    """Store the mesh and the map; the keys themselves are not stored, only their digest."""
+    header = {
+        "version": FORMAT_VERSION,
+        "fingerprint": fingerprint(prepared.pair),
+        "engine": prepared.engine,
+        "notes": list(prepared.notes),
+    }
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
+        points=prepared.mesh.points,
+        tets=prepared.mesh.tets.astype(np.int32),
+        mapped=prepared.mapped,
+    )
+    return buffer.getvalue()
+
+
+def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
+    """Restore a map that ``to_bytes`` stored.
+
+    Raises
+    ------
+    InputError
+        If the bytes are damaged, of another version, or belong to other keys.
+    """
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+            header = json.loads(bytes(stored["header"]))
+            version, owner = header["version"], header["fingerprint"]
+            engine, notes = str(header["engine"]), tuple(str(note) for note in header["notes"])
+            points, mapped = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "mapped"))
+            tets = np.asarray(stored["tets"], dtype=np.int64)
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(_DAMAGED) from error
+    if version != FORMAT_VERSION:
+        raise InputError(
+            f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; prepare the keys again."
+        )
+    if owner != fingerprint(pair):
+        raise InputError("The stored map belongs to other keys or another mesh; prepare the keys again.")
+    if points.ndim != 2 or points.shape[1] != 3 or mapped.shape != points.shape or not np.isfinite(mapped).all():
+        raise InputError(_DAMAGED)
+    if tets.ndim != 2 or tets.shape[1] != 4 or not len(tets) or tets.min() < 0 or tets.max() >= len(points):
+        raise InputError(_DAMAGED)
+    mesh = TetMesh(points, tets)
+    # Written so that a volume that is not a number counts as damage too.
+    if not (mesh.volumes.min() > 0.0 and determinants(mesh.jacobians(mapped)).min() > 0.0):
+        raise InputError(_DAMAGED)
+    return PreparedMap(pair, mesh, mapped, engine, notes)

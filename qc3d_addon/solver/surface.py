@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangles that go from one key to the other by their own rotation and stretch.
+
+Every triangle has a deformation gradient from the first key to the second, the unit normals being the third
+direction (Sumner & Popovic 2004). Its rotation and in-plane stretch are interpolated, and positions are fitted to
+them in the least-squares sense (Xu et al. 2005), then rotations to positions and so on (Sorkine & Alexa 2007).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rotations import rotation_matrices, rotation_vectors
+from .stiffness import scatter
+from .tetmesh import Floats, Ints
+
+# Triangles thinner than this part of the mean area have no usable directions in floating point.
+_THINNEST = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleDeformation:
+    """Rotation and stretch of triangles between two keys, in local tangent bases.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+        Triangles that have an area in both keys.
+    areas : (m,)
+        Their areas in the first key.
+    bases : (m, 3, 3)
+        Columns: two tangents and the unit normal in the first key.
+    gradients : (m, 3, 2)
+        Gradients of the hat functions in the tangent basis of the first key.
+    stretch : (m, 2, 2)
+        Symmetric in-plane stretch from the first key to the second.
+    turns : (m, 3)
+        Rotation vectors in radians, the short way round.
+    """
+
+    faces: Ints
+    areas: Floats
+    bases: Floats
+    gradients: Floats
+    stretch: Floats
+    turns: Floats
+
+    @classmethod
+    def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
+        """Deformation from ``key0`` (n, 3) to ``key1`` of the triangles of ``faces`` that have an area in both."""
+        double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
+        usable = (double0 > _THINNEST * double0.mean()) & (double1 > _THINNEST * double1.mean())
+        faces = faces[usable]
+        bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
+        gradients = hat_gradients(key0, faces, bases0)
+        planar = planar_jacobians(key1, faces, bases1, gradients)
+        spin = _planar_rotations(planar)
+        stretch = spin.transpose(0, 2, 1) @ planar
+        stretch = 0.5 * (stretch + stretch.transpose(0, 2, 1))
+        rotations = _lifted(bases1, spin) @ bases0.transpose(0, 2, 1)
+        return cls(faces, 0.5 * double0[usable], bases0, gradients, stretch, rotation_vectors(rotations))
+
+    def target_gradients(self, time: float) -> Floats:
+        """(m, 3, 2) hat gradients times the stretch at ``time``: what a rotation turns into target gradients."""
+        stretch = (1.0 - time) * np.eye(2) + time * self.stretch
+        return np.asarray(self.gradients @ stretch)
+
+    def interpolated_rotations(self, turns: Floats, time: float) -> Floats:
+        """(m, 3, 2) tangent parts of exp(time q) B0 for the rotation vectors q (m, 3)."""
+        return np.asarray(rotation_matrices(time * turns) @ self.bases[:, :, :2])
+
+    def fitted_rotations(self, positions: Floats, targets: Floats) -> Floats:
+        """(m, 3, 2) tangent parts of the rotations that bring the target gradients closest to ``positions`` (n, 3)."""
+        bases = tangent_bases(positions, self.faces)
+        corners = np.einsum("mki,mij->mkj", positions[self.faces], bases[:, :, :2])
+        planar = np.einsum("mki,mkj->mij", corners, targets)
+        spin = _planar_rotations(planar)
+        return np.asarray(bases[:, :, :2] @ spin)
+
+    def load(self, rotations: Floats, targets: Floats, count: int) -> Floats:
+        """(n, 3) right-hand side of the least-squares fit for rotated target gradients."""
+        forces = self.areas[:, None, None] * (targets @ rotations.transpose(0, 2, 1))
+        return scatter(self.faces, forces, count)
+
+
+def face_normals(positions: Floats, faces: Ints) -> Floats:
+    """(m, 3) normals of the triangles, twice as long as the areas."""
+    first, second, third = (positions[faces[:, corner]] for corner in range(3))
+    return np.cross(second - first, third - first)
+
+
+def tangent_bases(positions: Floats, faces: Ints) -> Floats:
+    """(m, 3, 3) orthonormal columns: along the first edge, across it in the plane, and the unit normal."""
+    normal = face_normals(positions, faces)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    along = positions[faces[:, 1]] - positions[faces[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    return np.stack([along, np.cross(normal, along), normal], axis=2)
+
+
+def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
+    """(m, 3, 2) gradients of the three hat functions of each triangle in its tangent basis."""
+    edges = np.stack(
+        [positions[faces[:, 1]] - positions[faces[:, 0]], positions[faces[:, 2]] - positions[faces[:, 0]]], axis=2
+    )
+    inner = np.linalg.inv(bases[:, :, :2].transpose(0, 2, 1) @ edges)
+    return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+
+def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: Floats) -> Floats:
+    """(m, 2, 2) in-plane Jacobians from the tangent basis of ``gradients`` to that of ``bases``."""
+    corners = np.einsum("mki,mij->mkj", positions[faces], bases[:, :, :2])
+    return np.einsum("mki,mkj->mij", corners, gradients)
+
+
+def _planar_rotations(planar: Floats) -> Floats:
+    """(m, 2, 2) rotations closest to 2 x 2 matrices."""
+    cosine, sine = planar[:, 0, 0] + planar[:, 1, 1], planar[:, 1, 0] - planar[:, 0, 1]
+    angle = np.arctan2(sine, cosine)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
+
+
+def _lifted(bases: Floats, spin: Floats) -> Floats:
+    """(m, 3, 3) bases with the tangents turned in their plane."""
+    lifted = bases.copy()
+    lifted[:, :, :2] = bases[:, :, :2] @ spin
+    return lifted

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What hangs together in a triangle mesh: duplicate vertices, edges, connected and closed components."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from .tetmesh import Bools, Floats, Ints
+
+
+def welded(key0: Floats, key1: Floats) -> tuple[Ints, Ints]:
+    """Vertices that coincide exactly in both keys (n, 3) count as one.
+
+    Returns
+    -------
+    representatives : (k,) int64
+        One vertex of each group.
+    group : (n,) int64
+        The group of every vertex: ``positions[representatives][group]`` are all positions.
+    """
+    _, representatives, group = np.unique(
+        np.concatenate([key0, key1], axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    # Groups in the order of the vertices keep sparse factors and reports in the mesh's own order.
+    order = np.argsort(representatives)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return representatives[order].astype(np.int64), rank[group.ravel()]
+
+
+def sides(faces: Ints) -> Ints:
+    """(3m, 2) the three edges of every triangle, smaller index first; edge k*m + j belongs to face j."""
+    return np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+
+
+def unique_edges(edges: Ints) -> Ints:
+    """(k, 2) edges without repetition and without loops."""
+    ordered = np.sort(edges, axis=1)
+    return np.unique(ordered[ordered[:, 0] != ordered[:, 1]], axis=0)
+
+
+def face_adjacency(faces: Ints) -> Ints:
+    """(k, 2) pairs of triangles that share an edge; around an edge with many triangles they form a chain."""
+    edges = sides(faces)
+    owner = np.tile(np.arange(len(faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    same = (edges[1:] == edges[:-1]).all(axis=1)
+    return np.stack([owner[:-1][same], owner[1:][same]], axis=1)
+
+
+def vertex_components(edges: Ints, count: int) -> Ints:
+    """(count,) labels of the connected components of vertices joined by ``edges`` (k, 2)."""
+    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def closed_faces(faces: Ints, labels: Ints) -> Bools:
+    """(m,) triangles of components in which every edge has exactly two triangles; ``labels`` are per vertex."""
+    edges, uses = np.unique(sides(faces), axis=0, return_counts=True)
+    is_open = np.zeros(int(labels.max(initial=-1)) + 1, dtype=bool)
+    is_open[labels[edges[uses != 2, 0]]] = True
+    return np.asarray(~is_open[labels[faces[:, 0]]])

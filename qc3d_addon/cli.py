@@ -16,6 +16,7 @@ from typing import NoReturn, get_args
 from .progress_bars import StageBars
 from .solver.array_files import read_pair, replacing, write_frames
 from .solver.errors import InputError, QC3DError
+from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
 from .solver.settings import Engine, Mode, Quality, Settings
 
 MOST_FRAMES = 10_000
@@ -46,8 +47,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _interpolate(arguments: argparse.Namespace) -> None:
-    from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
-
     settings = _settings(arguments)
     _require_distinct_files(arguments.pair, arguments.output, arguments.report)
     pair = read_pair(arguments.pair, arguments.first, arguments.second)
@@ -63,6 +62,8 @@ def _interpolate(arguments: argparse.Namespace) -> None:
                 report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
+    for note in prepared.notes:
+        print(f"qc3d: {note}", file=sys.stderr)
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:

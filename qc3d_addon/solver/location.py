@@ -88,7 +88,8 @@ def _require_inside(points: Floats, inside: Bools) -> None:
     outside = np.flatnonzero(~inside)
     if outside.size:
         raise MeshingError(
-            f"Point {outside[0]} at {points[outside[0]]} lies outside the tetrahedral mesh ({outside.size} such points)."
+            f"Point {outside[0]} at {points[outside[0]]} lies outside the tetrahedral mesh "
+            f"({outside.size} such points in all)."
         )
 
 

@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from .delaunay import delaunay_mesh
 from .errors import MeshingError
 from .sampling import RESOLUTIONS
 from .settings import Settings
 from .tetmesh import Floats, Ints, TetMesh
+from .tetwild import MARGIN, tetwild_mesh, unavailable_reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +36,8 @@ class FilledCube:
 
 
 def engine_available(name: str) -> bool:
-    """Whether the engine can run here; cheap, loads nothing."""
-    return name in ("auto", "delaunay")
+    """Whether the engine can run here; cheap, loads nothing compiled."""
+    return name in ("auto", "delaunay") or (name == "tetwild" and unavailable_reason() is None)
 
 
 def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
@@ -46,7 +49,7 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
     Parameters
     ----------
     points : (n, 3) float64
-        Vertices in the cube, away from its faces (0.1 or more).
+        Vertices inside [0.1, 0.9]³.
     faces : (m, 3) int64
         Triangles: open, non-manifold, crossing, degenerate or none at all.
     settings : Settings
@@ -54,9 +57,56 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
     Raises
     ------
     MeshingError
-        If the chosen engine cannot run or fails; with ``auto`` the second engine steps in and a note says so.
+        If the input is unusable, or the chosen engine cannot run or fails; with ``auto`` the second engine steps in
+        and a note says so.
     """
-    resolution = RESOLUTIONS[settings.quality]
-    if settings.engine == "tetwild":
-        raise MeshingError("The meshing engine tetwild is not installed; choose the engine delaunay or auto.")
-    return FilledCube(delaunay_mesh(points, faces, resolution, settings.seed), "delaunay", ())
+    points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    _require_usable(points, faces)
+    resolution, notes = RESOLUTIONS[settings.quality], []
+    if settings.engine != "delaunay":
+        try:
+            mesh = tetwild_mesh(points, faces, resolution, settings.seed, settings.mesh_time_limit)
+            require_filled_cube(mesh)
+            return FilledCube(mesh, "tetwild", ())
+        except MeshingError as error:
+            if settings.engine == "tetwild":
+                raise
+            notes.append(f"The cube was filled by the engine delaunay. {error}")
+    mesh = delaunay_mesh(points, faces, resolution, settings.seed)
+    require_filled_cube(mesh)
+    return FilledCube(mesh, "delaunay", tuple(notes))
+
+
+def require_filled_cube(mesh: TetMesh) -> None:
+    """Check that a mesh is a conforming partition of the unit cube into positive tetrahedra.
+
+    Raises
+    ------
+    MeshingError
+        If a vertex is not finite, a tetrahedron is flat or inverted, faces do not match, the boundary is not exactly
+        on the cube's faces, or the volumes do not sum to 1.
+    """
+    problem = None
+    if not np.isfinite(mesh.points).all():
+        problem = "has vertices that are not finite"
+    elif not (mesh.volumes > 0.0).all():
+        problem = f"has {np.count_nonzero(mesh.volumes <= 0.0)} flat or inverted tetrahedra"
+    elif not mesh.on_cube_face[mesh.boundary_faces].all(axis=1).any(axis=1).all():
+        problem = "has boundary faces that do not lie on the cube"
+    elif abs(float(mesh.volumes.sum()) - 1.0) > 1e-12:
+        problem = f"misses the cube's volume by {abs(float(mesh.volumes.sum()) - 1.0):.1e}"
+    if problem:
+        raise MeshingError(f"The tetrahedral mesh {problem}; try another quality, seed or engine.")
+
+
+def _require_usable(points: Floats, faces: Ints) -> None:
+    if not len(points):
+        raise MeshingError("There is no vertex to fill the cube around.")
+    # Not "outside the range": the comparison must also catch what is not a number.
+    bad = np.flatnonzero(~((points >= MARGIN) & (points <= 1.0 - MARGIN)).all(axis=1))
+    if bad.size:
+        raise MeshingError(
+            f"Vertex {bad[0]} at {points[bad[0]]} is not inside [{MARGIN}, {1.0 - MARGIN}]³, where the cube is filled."
+        )
+    if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
+        raise MeshingError(f"A triangle refers to a vertex outside 0..{len(points) - 1}.")

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshing engine fTetWild (Hu et al. 2020, *Fast tetrahedral meshing in the wild*), run in a child process."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import numpy as np
+
+from .delaunay import triangulate
+from .errors import MeshingError
+from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
+from .tetmesh import Floats, Ints, TetMesh
+
+MARGIN = 0.1  # the surface keeps this far from the cube's faces
+CHILD = Path(__file__).resolve().parent.parent / "worker" / "tetwild_child.py"
+
+_EDGE_FACTOR = 1.6  # fTetWild's ideal edges per distance between Poisson-disk samples, for equally fine meshes
+
+
+def unavailable_reason() -> str | None:
+    """Why fTetWild cannot run here, as a clause, or None if it can; loads nothing."""
+    if _wrapper() is None:
+        return "pytetwild is not installed for this Python"
+    if _interpreter() is None:
+        return "no Python interpreter to run it was found"
+    return None
+
+
+def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int, time_limit: float) -> TetMesh:
+    """Fill the cube. Not repeatable: fTetWild gives another mesh at every call.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Vertices inside [0.1, 0.9]³.
+    faces : (m, 3) int64
+        Triangles, in any state.
+    resolution : Resolution
+    seed : int
+        Of the samples that carry the size field.
+    time_limit : float
+        Seconds after which the child process is killed.
+
+    Raises
+    ------
+    MeshingError
+        If fTetWild is not available, has no triangle to work on, fails, crashes or exceeds the limit.
+    """
+    vertices, triangles = cluster(points, faces, 0.75 * resolution.spacing)
+    if not len(triangles):
+        raise MeshingError("The meshing engine tetwild needs triangles, and the mesh has none that it could use.")
+    rng = np.random.default_rng(seed)
+    coarse = RESOLUTIONS["draft"]
+    surface = sample_surface(points, faces, coarse.spacing, rng)
+    samples = sample_cube(surface, coarse.around(surface), rng)
+    # fTetWild works in the bounding box of all its vertices, grown by the edge length on every side. With the two
+    # vertices that no triangle uses this box is the unit cube, exactly.
+    inner = np.array([[MARGIN] * 3, [1.0 - MARGIN] * 3])
+    diagonal = float(np.linalg.norm(inner[1] - inner[0]))
+    arrays = {
+        "points": np.concatenate([vertices, inner]),
+        "faces": triangles,
+        "edge_length": np.array(MARGIN),
+        "epsilon": np.array(0.7 * resolution.spacing / diagonal),
+        "size_points": samples,
+        "size_tets": triangulate(samples),
+        "size_values": _EDGE_FACTOR * resolution.around(surface)(samples),
+    }
+    positions, tets = run_child(arrays, time_limit)
+    for exact in (0.0, 1.0):
+        positions[np.abs(positions - exact) < 1e-9] = exact
+    return TetMesh(positions, tets)
+
+
+def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:
+    """Coarsen a triangle mesh: the vertices of one cell of a regular grid become one, triangles that collapse go.
+
+    The volume is coarser than the surface, and fTetWild's running time follows the surface it is given.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    faces : (m, 3) int64
+    cell : float
+        Edge length of the grid's cells.
+
+    Returns
+    -------
+    (k, 3) float64 and (l, 3) int64
+        Vertices in use (means of their cells) and distinct triangles of three distinct vertices.
+    """
+    used, corners = np.unique(faces, return_inverse=True)
+    _, cell_of = np.unique(np.floor(points[used] / cell).astype(np.int64), axis=0, return_inverse=True)
+    cell_of = cell_of.reshape(-1)
+    population = np.bincount(cell_of)
+    means = np.stack([np.bincount(cell_of, points[used, axis]) / population for axis in range(3)], axis=1)
+    merged = np.sort(cell_of[corners.reshape(-1, 3)], axis=1)
+    merged = merged[(merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2])]
+    kept, triangles = np.unique(np.unique(merged, axis=0), return_inverse=True)
+    return means[kept], triangles.reshape(-1, 3)
+
+
+def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floats, Ints]:
+    """Run the child program on ``arrays``; return positions (N, 3) and tetrahedra (M, 4).
+
+    Raises
+    ------
+    MeshingError
+        Whatever way the child failed.
+    """
+    reason = unavailable_reason()
+    if reason is not None:
+        raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}. Choose the engine delaunay or auto.")
+    with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
+        folder = Path(name)
+        np.savez(folder / "input.npz", **arrays)  # type: ignore[arg-type]
+        numpy_folder = Path(np.__file__).resolve().parent.parent
+        command = [_interpreter(), "-I", CHILD, _wrapper(), numpy_folder, folder, time_limit]
+        status, message = _run([str(part) for part in command], folder / "errors.txt", time_limit)
+        if status is None:
+            raise MeshingError(
+                f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
+                "allow it more, or choose a lower quality or the engine delaunay."
+            )
+        output = folder / "output.npz"
+        if status != 0 or not output.exists():
+            how = f" with an error: {message}." if message else f" without a mesh (exit status {status})."
+            raise MeshingError(f"The meshing engine tetwild ended{how}")
+        with np.load(output, allow_pickle=False) as archive:
+            return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
+
+
+def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
+    """Exit status (None: killed at the time limit) and the last line written to standard error."""
+    options: dict[str, object]
+    if sys.platform == "win32":
+        options = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
+    else:
+        options = {"start_new_session": True}
+    with open(errors, "wb") as stream:
+        process = subprocess.Popen(  # type: ignore[call-overload]
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, **options
+        )
+        try:
+            status = process.wait(time_limit)
+        except subprocess.TimeoutExpired:
+            status = None
+        finally:  # also when the user interrupts the wait
+            _kill_group(process)
+    lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return status, lines[-1] if lines else ""
+
+
+def _kill_group(process: subprocess.Popen[bytes]) -> None:
+    """End the child and whatever it started; nothing happens if it has ended."""
+    if sys.platform == "win32":
+        process.kill()
+    else:
+        try:
+            os.killpg(process.pid, signal.SIGKILL)
+        except (ProcessLookupError, PermissionError):
+            pass  # the group is gone
+    process.wait()
+
+
+def _wrapper() -> Path | None:
+    """The file of pytetwild's compiled module, found without importing the package, which needs pyvista."""
+    spec = importlib.util.find_spec("pytetwild")
+    for location in (spec.submodule_search_locations or ()) if spec else ():
+        for suffix in EXTENSION_SUFFIXES:
+            candidate = Path(location) / f"PyfTetWildWrapper{suffix}"
+            if candidate.is_file():
+                return candidate
+    return None
+
+
+def _interpreter() -> Path | None:
+    """A Python like the running one; where Python is embedded, ``sys.executable`` may be the application."""
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    suffix = sysconfig.get_config_var("EXE") or ""
+    candidates = [Path(sys.executable)] if sys.executable else []
+    for folder in (Path(sys.prefix), Path(sys.base_prefix)):
+        for name in (f"python{version}", "python3", "python"):
+            candidates += [folder / "bin" / f"{name}{suffix}", folder / f"{name}{suffix}"]
+    for candidate in candidates:
+        if "python" in candidate.name.lower() and candidate.is_file() and os.access(candidate, os.X_OK):
+            return candidate
+    return None

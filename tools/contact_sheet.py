@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draw in-betweens side by side: first key, in-betweens, second key, one row for each file.
+
+A file is a baked .blend (then --object, --from and --to say what to draw) or the FRAMES.npz of ``qc3d interpolate``.
+All rows show the same two keys, through the same camera.
+
+    python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --object Arm --from Basis --to "Bend 90" \\
+        --straight --output sheet.png
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib
+import numpy as np
+
+from shading import VIEWS, Camera, Floats, Ints, best_view, draw
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
+BACKGROUND = (0.93, 0.93, 0.93)
+KEY_COLOUR = (0.55, 0.68, 0.86)
+INBETWEEN_COLOUR = (0.93, 0.75, 0.58)
+_DOTS_PER_INCH = 100
+
+
+class Row(NamedTuple):
+    """Shapes (k, n, 3) of one mesh at ``times`` (k,), the first and the last of them the keys."""
+
+    label: str
+    faces: Ints
+    times: Floats
+    frames: Floats
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Read the rows and write the picture."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("rows", nargs="+", metavar="[LABEL=]FILE", help="a baked .blend, or an .npz of frames")
+    parser.add_argument("--object", help="in a .blend: the object")
+    parser.add_argument("--from", dest="first", help="in a .blend: the first key")
+    parser.add_argument("--to", dest="second", help="in a .blend: the second key")
+    parser.add_argument("--straight", action="store_true", help="add the straight blend of the keys as the first row")
+    parser.add_argument("--view", choices=["auto", *VIEWS], default="auto")
+    parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
+    parser.add_argument("--height", type=int, default=220, metavar="PIXELS", help="of one row (default: 220)")
+    parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png")
+    arguments = parser.parse_args(argv)
+
+    rows = [_read(row, arguments) for row in arguments.rows]
+    if arguments.straight:
+        rows.insert(0, straight_blend(rows[0]))
+    if arguments.up == "y":
+        rows = [row._replace(frames=row.frames[..., [0, 2, 1]] * (1.0, -1.0, 1.0)) for row in rows]
+    save_sheet(rows, arguments.view, arguments.height, arguments.output)
+
+
+def straight_blend(row: Row) -> Row:
+    """What Blender's sliders give between the same two keys: every vertex on a straight line."""
+    weight = row.times[:, None, None]
+    return row._replace(label="straight blend", frames=(1.0 - weight) * row.frames[0] + weight * row.frames[-1])
+
+
+def save_sheet(rows: list[Row], view: str, height: int, path: Path) -> None:
+    """Draw the rows, all through one camera, and save them as a PNG."""
+    if view == "auto":
+        view = best_view(rows[0].frames[0], rows[0].frames[-1])
+    camera = Camera.around(np.concatenate([row.frames for row in rows]), view)
+    pictures = [[_picture(row, index, camera, height) for index in range(len(row.times))] for row in rows]
+    columns = max(len(row) for row in pictures)
+    width = pictures[0][0].shape[1]
+    left, top = 44, 30  # pixels for the labels of rows and columns
+    size = (left + columns * width, top + len(rows) * height)
+    figure = pyplot.figure(figsize=(size[0] / _DOTS_PER_INCH, size[1] / _DOTS_PER_INCH), dpi=_DOTS_PER_INCH)
+    figure.set_facecolor(BACKGROUND)
+    for number, (row, drawn) in enumerate(zip(rows, pictures, strict=True)):
+        bottom = (len(rows) - 1 - number) * height
+        sheet = np.concatenate(drawn, axis=1)
+        figure.figimage(sheet, xo=left, yo=bottom, origin="upper")
+        figure.text(
+            left / 2 / size[0], (bottom + height / 2) / size[1], row.label, rotation=90, ha="center", va="center"
+        )
+        for index, time in enumerate(row.times if number == 0 else ()):
+            label = {0.0: "first key", 1.0: "second key"}.get(float(time), f"{time:.3g}")
+            figure.text(
+                (left + (index + 0.5) * width) / size[0], 1.0 - top / 2 / size[1], label, ha="center", va="center"
+            )
+    figure.savefig(path, dpi=_DOTS_PER_INCH, facecolor=BACKGROUND)
+    pyplot.close(figure)
+
+
+def _picture(row: Row, index: int, camera: Camera, height: int) -> Floats:
+    colour = KEY_COLOUR if index in (0, len(row.times) - 1) else INBETWEEN_COLOUR
+    return draw(row.frames[index], row.faces, camera, height, colour, BACKGROUND)
+
+
+def _read(text: str, arguments: argparse.Namespace) -> Row:
+    label, _, name = text.rpartition("=")
+    path = Path(name)
+    if path.suffix == ".blend":
+        if None in (arguments.object, arguments.first, arguments.second):
+            raise SystemExit("A .blend needs --object, --from and --to.")
+        return _read_blend(label or path.stem, path, arguments.object, arguments.first, arguments.second)
+    with np.load(path, allow_pickle=False) as stored:
+        return Row(label or path.stem, stored["faces"].astype(np.int64), stored["times"], stored["frames"])
+
+
+def _read_blend(label: str, path: Path, name: str, first: str, second: str) -> Row:
+    """The user's two keys and the in-betweens that were baked between them."""
+    import bpy
+
+    from qc3d_addon.blender.mesh_data import key_coordinates, triangles
+    from qc3d_addon.blender.records import Record
+
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    mesh = bpy.data.objects[name].data
+    chain = Record.read(mesh.shape_keys).chain(first, second)
+    if chain is None:
+        raise SystemExit(f"{path} has no in-betweens from {first!r} to {second!r}.")
+    names = {0: first, chain.intervals: second}
+    names |= {step: key for step, key in chain.keys.items() if step not in names}
+    steps = sorted(names)
+    count = len(mesh.vertices)
+    frames = np.stack([key_coordinates(mesh.shape_keys.key_blocks[names[step]], count) for step in steps])
+    return Row(label, triangles(mesh).astype(np.int64), np.array(steps) / chain.intervals, frames.astype(np.float64))
+
+
+if __name__ == "__main__":
+    main()

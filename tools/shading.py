@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draw a triangle mesh as a shaded picture: an orthographic camera and a depth buffer in numpy, no window needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Directions to the camera, z up, and to what the animator calls them; objects look along -y, as Blender's do.
+VIEWS = {"front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0), "three-quarter": (0.6, -0.75, 0.3)}
+
+# Lights as direction (right, up, towards the camera) and strength: key from the upper left, fill from the right.
+_LIGHTS = (((-0.5, 0.65, 0.6), 0.75), ((0.8, 0.1, 0.5), 0.22))
+_AMBIENT = 0.2
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An orthographic camera that shows the same part of space in every picture.
+
+    Parameters
+    ----------
+    axes : (3, 3)
+        Rows point right, up, and towards the camera.
+    low, high : (2,)
+        Corners of what is seen, along right and up.
+    """
+
+    axes: Floats
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def around(cls, shapes: Floats, view: str, margin: float = 0.04) -> Camera:
+        """A camera that holds all shapes (k, n, 3), from one of ``VIEWS``."""
+        axes = _axes(np.array(VIEWS[view]))
+        flat = shapes.reshape(-1, 3) @ axes[:2].T
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        border = margin * np.max(high - low)
+        return cls(axes, low - border, high + border)
+
+
+def best_view(key0: Floats, key1: Floats) -> str:
+    """The view of ``VIEWS`` in which the motion from one key to the other is seen best."""
+    motion = key1 - key0
+    return max(VIEWS, key=lambda view: float(np.linalg.norm(motion @ _axes(np.array(VIEWS[view]))[:2].T)))
+
+
+def draw(
+    points: Floats,
+    faces: Ints,
+    camera: Camera,
+    height: int,
+    colour: tuple[float, float, float],
+    background: tuple[float, float, float],
+    samples: int = 3,
+) -> Floats:
+    """Draw one shape.
+
+    Parameters
+    ----------
+    points : (n, 3)
+        Vertex positions.
+    faces : (m, 3)
+        Triangles; their back sides are drawn darker.
+    height : int
+        Rows of the picture; the columns follow from the camera.
+    colour, background
+        Red, green, blue in 0..1.
+    samples
+        Each pixel is the mean of ``samples`` x ``samples`` points.
+
+    Returns
+    -------
+    (height, width, 3) picture, first row on top.
+    """
+    fine = height * samples
+    scale = fine / (camera.high[1] - camera.low[1])
+    width = int(np.ceil(scale * (camera.high[0] - camera.low[0]) / samples)) * samples
+    seen = points @ camera.axes.T
+    spots = (seen[:, :2] - camera.low) * scale
+    normals = _vertex_normals(points, faces) @ camera.axes.T
+
+    triangle, rows, columns, weights = _covered(spots, faces, fine, width)
+    corners = faces[triangle]
+    depth = np.einsum("pk,pk->p", weights, seen[corners, 2])
+    # The last write to a pixel stays, so the nearest goes last.
+    order = np.argsort(depth, kind="stable")
+    nearest = np.full(fine * width, -1, dtype=np.int64)
+    nearest[rows[order] * width + columns[order]] = order
+    drawn = nearest >= 0
+    chosen = nearest[drawn]
+
+    normal = np.einsum("pk,pka->pa", weights[chosen], normals[corners[chosen]])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    front = normal[:, 2] >= 0.0
+    light = _brightness(np.where(front[:, None], normal, -normal)) * np.where(front, 1.0, 0.6)
+    picture = np.broadcast_to(np.array(background), (fine * width, 3)).copy()
+    picture[drawn] = np.clip(light[:, None] * np.array(colour), 0.0, 1.0)
+    picture = picture.reshape(fine // samples, samples, width // samples, samples, 3).mean(axis=(1, 3))
+    return np.asarray(picture[::-1])
+
+
+def _axes(towards: Floats) -> Floats:
+    towards = towards / np.linalg.norm(towards)
+    right = np.cross((0.0, 0.0, 1.0), towards)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+def _vertex_normals(points: Floats, faces: Ints) -> Floats:
+    """(n, 3): area-weighted, not normalised."""
+    corners = points[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.stack(
+        [np.bincount(faces.ravel(), weights=np.repeat(area[:, axis], 3), minlength=len(points)) for axis in range(3)],
+        axis=1,
+    )
+
+
+def _covered(spots: Floats, faces: Ints, height: int, width: int) -> tuple[Ints, Ints, Ints, Floats]:
+    """Every pixel whose centre a triangle covers: triangle, row, column, and barycentric weights (p, 3)."""
+    corners = spots[faces]
+    most = np.array([width, height]) - 1
+    low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, most).astype(np.int64)
+    high = np.clip(np.floor(corners.max(axis=1) - 0.5), -1, most).astype(np.int64)
+    size = np.maximum(high - low + 1, 0)
+    count = size.prod(axis=1)
+    triangle = np.repeat(np.arange(len(faces)), count)
+    within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    columns = low[triangle, 0] + within % np.maximum(size[triangle, 0], 1)
+    rows = low[triangle, 1] + within // np.maximum(size[triangle, 0], 1)
+
+    first, second, third = (corners[triangle, corner] for corner in range(3))
+    centre = np.stack([columns, rows], axis=1) + 0.5
+    double_area = _cross(second - first, third - first)
+    flat = double_area == 0.0
+    inverse = 1.0 / np.where(flat, 1.0, double_area)
+    opposite = (
+        _cross(third - second, centre - second),
+        _cross(first - third, centre - third),
+        _cross(second - first, centre - first),
+    )
+    weights = np.stack(opposite, axis=1) * inverse[:, None]
+    inside = (weights >= 0.0).all(axis=1) & ~flat
+    return triangle[inside], rows[inside], columns[inside], weights[inside]
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+
+
+def _brightness(normals: Floats) -> Floats:
+    """(p,): diffuse light from both lamps, the ambient light, and a faint darkening towards the outline."""
+    light = np.full(len(normals), _AMBIENT)
+    for direction, strength in _LIGHTS:
+        unit = np.array(direction) / np.linalg.norm(direction)
+        light += strength * np.maximum(normals @ unit, 0.0)
+    return np.asarray(light * (0.8 + 0.2 * normals[:, 2]))

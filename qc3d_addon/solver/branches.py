@@ -11,7 +11,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
 from .rotations import nearest_branch
@@ -48,7 +48,7 @@ def consistent_branches(turns: Floats, adjacency: Ints) -> Floats:
     return _carried_from(roots, tree, turns)
 
 
-def _carried_from(roots: Ints, tree: coo_array, turns: Floats) -> Floats:
+def _carried_from(roots: Ints, tree: csr_array, turns: Floats) -> Floats:
     """Walk the spanning forest outwards from the roots, a whole generation at a time."""
     count = len(turns)
     # One more node joins all roots, so that one search covers every part.
@@ -56,7 +56,7 @@ def _carried_from(roots: Ints, tree: coo_array, turns: Floats) -> Floats:
     rows = np.concatenate([rows, np.full(len(roots), count)])
     columns = np.concatenate([columns, roots])
     joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
-    order, parents = breadth_first_order(joined, count, directed=False)
+    order, parents = (found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False))
     depth = _depths(order, parents)
     result = turns.copy()
     by_depth = order[np.argsort(depth[order], kind="stable")]
@@ -69,7 +69,7 @@ def _carried_from(roots: Ints, tree: coo_array, turns: Floats) -> Floats:
 
 def _depths(order: Ints, parents: Ints) -> Ints:
     """Distance from the root of every node of a breadth-first order, by pointer doubling."""
-    ancestor = parents.astype(np.int64)
+    ancestor = parents.copy()
     ancestor[order[0]] = order[0]
     depth = np.ones(len(parents), dtype=np.int64)
     depth[order[0]] = 0

@@ -11,7 +11,7 @@ import numpy as np
 
 from .keypair import KeyPair
 from .rotations import closest_rotations, rotation_matrices, rotation_vectors
-from .tetmesh import Bools, Floats
+from .tetmesh import Bools, Floats, Ints
 
 STILL_TOLERANCE = 1e-6
 MARGIN = 0.17
@@ -137,7 +137,7 @@ class Embedding:
         return np.asarray(areas / areas.sum())
 
 
-def vertex_areas(points: Floats, faces: np.ndarray) -> Floats:
+def vertex_areas(points: Floats, faces: Ints) -> Floats:
     """(n,) a third of the area of the triangles around each vertex, never below a thousandth of the mean."""
     corners = points[faces]
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

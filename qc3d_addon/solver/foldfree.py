@@ -104,10 +104,10 @@ class FoldFreeFitter:
         inverse = np.linalg.inv(_restricted(diagonal, self._free))
 
         def precondition(vector: Floats) -> Floats:
-            return np.einsum("nij,nj->ni", inverse, vector.reshape(-1, 3)).ravel() * free
+            return np.asarray(np.einsum("nij,nj->ni", inverse, vector.reshape(-1, 3)).ravel() * free)
 
         def multiply(vector: Floats) -> Floats:
-            return np.asarray(matrix @ (vector * free)) * free
+            return np.asarray(matrix @ (vector * free) * free)
 
         size = len(free)
         operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)

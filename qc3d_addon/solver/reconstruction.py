@@ -16,7 +16,7 @@ from scipy.sparse.linalg import cg
 from .errors import ReconstructionError
 from .representation import conductivity
 from .stiffness import StiffnessPattern, stiffness_elements
-from .tetmesh import Floats, Ints, TetMesh
+from .tetmesh import Bools, Floats, Ints, TetMesh
 
 _TOLERANCE = 1e-14
 _MOST_ITERATIONS = 20_000
@@ -78,13 +78,13 @@ class Reconstructor:
         return result
 
 
-def _solve_held(matrix: csr_array, held: np.ndarray, column: Floats) -> Floats:
+def _solve_held(matrix: csr_array, held: Bools, column: Floats) -> Floats:
     """Solve the free rows for their values, the held ones given; Jacobi-preconditioned conjugate gradients."""
     free = ~held
     inner = matrix[free][:, free]
     # Solving for the correction of the guess keeps the relative tolerance meaningful for good guesses.
     residual = -(matrix @ column)[free]
-    scale = np.abs(matrix) @ np.abs(column)
+    scale = abs(matrix) @ np.abs(column)
     floor = _TOLERANCE * float(np.linalg.norm(scale[free]))
     preconditioner = diags_array(1.0 / inner.diagonal())
     step, status = cg(inner, residual, rtol=0.0, atol=floor, maxiter=_MOST_ITERATIONS, M=preconditioner)

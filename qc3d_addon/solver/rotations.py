@@ -58,7 +58,8 @@ def closest_rotations(matrices: Floats) -> Floats:
 def _closest_rotations_svd(matrices: Floats) -> Floats:
     left, _, right = np.linalg.svd(matrices)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return np.asarray(left @ right)
+    closest: Floats = left @ right
+    return closest
 
 
 def rotation_vectors(rotations: Floats) -> Floats:
@@ -67,7 +68,7 @@ def rotation_vectors(rotations: Floats) -> Floats:
     vector, scalar = quaternions[:, 1:], quaternions[:, 0]
     sine = np.linalg.norm(vector, axis=1)
     angle = 2.0 * np.arctan2(sine, scalar)
-    return vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0)[:, None]
+    return np.asarray(vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0)[:, None])
 
 
 def _quaternions(rotations: Floats) -> Floats:

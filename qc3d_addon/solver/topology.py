@@ -39,7 +39,7 @@ def sides(faces: Ints) -> Ints:
 def unique_edges(edges: Ints) -> Ints:
     """(k, 2) edges without repetition and without loops."""
     ordered = np.sort(edges, axis=1)
-    return np.unique(ordered[ordered[:, 0] != ordered[:, 1]], axis=0)
+    return np.asarray(np.unique(ordered[ordered[:, 0] != ordered[:, 1]], axis=0))
 
 
 def face_adjacency(faces: Ints) -> Ints:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .delaunay import triangulate
+from .tet_quality import triangulate
 from .errors import MeshingError
 from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .tetmesh import Floats, Ints, TetMesh

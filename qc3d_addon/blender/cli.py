@@ -1,0 +1,13 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender --command qc3d …``: the command ``qc3d`` inside Blender's own Python."""
+
+from __future__ import annotations
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run one command line; the exit status."""
+    # Imported when the command runs: Blender registers it each time it starts.
+    from ..cli import main
+
+    return main(arguments)

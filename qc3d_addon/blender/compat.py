@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every difference between the Blender versions that QC3D supports (4.2 LTS to 5.2 LTS)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+
+def register_command(name: str, handler: Callable[[list[str]], int]) -> list[object]:
+    """Register ``blender --command NAME``; the handles to take it back, none where Blender has no commands."""
+    register = getattr(bpy.utils, "register_cli_command", None)
+    return [] if register is None else [register(name, handler)]
+
+
+def unregister_command(handle: object) -> None:
+    """Take back what ``register_command`` returned."""
+    bpy.utils.unregister_cli_command(handle)
+
+
+def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
+    """Add a driver whose value reaches the property unchanged.
+
+    A new driver comes with a generator modifier (up to 4.5) or with two Bézier keyframes from (0, 0) to (1, 1) (5.x);
+    the Bézier curve turns 0.5 into 0.49999994. Without either the value passes through as it is.
+    """
+    curve = owner.driver_add(data_path)
+    while curve.modifiers:
+        curve.modifiers.remove(curve.modifiers[0])
+    while curve.keyframe_points:
+        curve.keyframe_points.remove(curve.keyframe_points[0])
+    return curve
+
+
+def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
+    """The F-curve that animates a property of ``owner`` in its active action, if there is one."""
+    animation = owner.animation_data
+    if animation is None or animation.action is None:
+        return None
+    if not hasattr(animation, "action_slot"):  # before 4.4 an action holds its curves itself
+        return animation.action.fcurves.find(data_path)
+    if animation.action_slot is None:
+        return None
+    from bpy_extras import anim_utils
+
+    channels = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    return None if channels is None else channels.fcurves.find(data_path)
+
+
+def ensure_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
+    """The F-curve of a property, with the action (and slot) made where there is none."""
+    curve = find_fcurve(owner, data_path)
+    if curve is not None:
+        return curve
+    animation = owner.animation_data_create()
+    if animation.action is None:
+        animation.action = bpy.data.actions.new(f"{owner.name}Action")
+    if hasattr(animation, "action_slot"):
+        return animation.action.fcurve_ensure_for_datablock(owner, data_path)
+    return animation.action.fcurves.new(data_path)

@@ -21,8 +21,8 @@ demo: $(VENV)/installed
 	rm -rf demo && mkdir demo
 	$(BIN)/qc3d bake assets/limb.blend --object Arm --from Basis --to "Bend and twist" --frames 5 \
 	    --output demo/limb.blend --report demo/limb.json
-	$(BIN)/python tools/contact_sheet.py demo/limb.blend --object Arm --from Basis --to "Bend and twist" \
-	    --label "QC3D, mode linear" --output demo/limb.png
+	$(BIN)/python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --straight \
+	    --object Arm --from Basis --to "Bend and twist" --output demo/limb.png
 	@echo "Look at demo/limb.png, open demo/limb.blend in Blender, read demo/limb.json."
 
 test: $(VENV)/installed lint

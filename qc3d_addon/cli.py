@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from importlib import metadata
 from pathlib import Path
@@ -62,7 +62,26 @@ def _interpolate(arguments: argparse.Namespace) -> None:
                 report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
-    for note in prepared.notes:
+    _print_notes(prepared.notes)
+
+
+def _bake(arguments: argparse.Namespace) -> None:
+    try:
+        from .blender.bake import BakeRequest, bake_file
+    except ImportError as error:
+        raise InputError(f"Blender's Python module does not load: {error}.") from error
+    _require_distinct_files(arguments.file, arguments.report)
+    _require_distinct_files(arguments.output, arguments.report)
+    request = BakeRequest(
+        arguments.first, arguments.second, arguments.frames, _settings(arguments), arguments.keyframes
+    )
+    with StageBars() as bars:
+        result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)
+    _print_notes(result.notes)
+
+
+def _print_notes(notes: Iterable[str]) -> None:
+    for note in notes:
         print(f"qc3d: {note}", file=sys.stderr)
 
 
@@ -89,6 +108,20 @@ def _parser() -> argparse.ArgumentParser:
     _add_keys(interpolate, "shape", "FRAMES.npz", "faces, frames (N + 2, n, 3), times, key0, key1")
     _add_settings(interpolate)
     interpolate.set_defaults(run=_interpolate)
+
+    bake = commands.add_parser("bake", help="in-between shape keys in a .blend file")
+    bake.add_argument("file", type=Path, metavar="FILE.blend", help="a file with a mesh that has two shape keys")
+    bake.add_argument("--object", required=True, metavar="NAME", help="the mesh object")
+    _add_keys(bake, "shape key", "OUT.blend", "the file with the in-betweens; may be the file itself")
+    bake.add_argument(
+        "--keyframes",
+        type=_whole_number,
+        nargs=2,
+        metavar=("FIRST", "LAST"),
+        help="animate the slider over these frames",
+    )
+    _add_settings(bake)
+    bake.set_defaults(run=_bake)
     return parser
 
 

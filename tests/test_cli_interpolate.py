@@ -155,9 +155,7 @@ def test_a_key_that_is_not_finite(
 
 
 @pytest.mark.parametrize("kind", ["missing", "folder", "text", "pickle", "single array", "truncated", "corrupt"])
-def test_files_that_are_no_pair(
-    kind: str, bar_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_that_are_no_pair(kind: str, bar_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "odd.npz"
     whole = bar_file.read_bytes()
     if kind == "folder":
@@ -192,7 +190,9 @@ def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     path = tmp_path / "frames.npz"
     path.write_text("earlier")
     with array_files.replacing(path) as new:
+        assert new.is_absolute()
         assert new.suffix == path.suffix
+        assert not new.exists()
         new.write_text("whole")
         assert path.read_text() == "earlier"
     assert path.read_text() == "whole"

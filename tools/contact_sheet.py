@@ -118,16 +118,14 @@ def _read_blend(label: str, path: Path, name: str, first: str, second: str) -> R
     from qc3d_addon.blender.records import Record
 
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    mesh = bpy.data.objects[name].data
-    chain = Record.read(mesh.shape_keys).chain(first, second)
+    obj = bpy.data.objects[name]
+    chain = Record.read(obj.data.shape_keys).chain(first, second)
     if chain is None:
         raise SystemExit(f"{path} has no in-betweens from {first!r} to {second!r}.")
-    names = {0: first, chain.intervals: second}
-    names |= {step: key for step, key in chain.keys.items() if step not in names}
-    steps = sorted(names)
-    count = len(mesh.vertices)
-    frames = np.stack([key_coordinates(mesh.shape_keys.key_blocks[names[step]], count) for step in steps])
-    return Row(label, triangles(mesh).astype(np.int64), np.array(steps) / chain.intervals, frames.astype(np.float64))
+    keys = chain.keys | {0: first, chain.intervals: second}
+    steps = sorted(keys)
+    frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
+    return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)
 
 
 if __name__ == "__main__":

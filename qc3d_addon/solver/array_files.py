@@ -79,7 +79,7 @@ def write_frames(path: Path, pair: KeyPair, times: Floats, frames: Floats) -> No
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give the name of a new empty file beside ``path``, which takes its place when the block ends well.
+    """Give the absolute name of a new file beside ``path``, which takes its place when the block ends well.
 
     Entering tells at once whether the place can be written, before any work; leaving by an error removes the new file
     and keeps what was there.
@@ -91,14 +91,16 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     if path.is_dir():
         raise InputError(f"{path} is a folder; give the name of a file.")
-    new = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    target = path.resolve()
+    new = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
-        os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        new.touch(exist_ok=False)
+        new.unlink()  # Blender would keep even an empty file as a backup of the one it saves
     except OSError as error:
         raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
     try:
         yield new
-        os.replace(new, path)
+        new.replace(target)
     finally:
         with suppress(FileNotFoundError):
             new.unlink()

@@ -55,18 +55,18 @@ def eigen_form(stretch: Floats) -> Floats:
     """(M, 6): eigenvalues a >= b >= c and Euler angles of the eigenvectors: the second six-number form.
 
     P = W diag(a, b, c) W^T with W = Rz(alpha) Ry(beta) Rx(gamma) a rotation, angles in radians, alpha and gamma in
-    (-pi, pi], beta in [-pi/2, pi/2]. Where W has determinant -1 its last column is flipped, which leaves P as it is.
+    [-pi, pi], beta in [-pi/2, pi/2]. Where W has determinant -1 its last column is flipped, which leaves P as it is.
     """
     values, vectors = np.linalg.eigh(stretch)
     values, vectors = values[:, ::-1], vectors[:, :, ::-1].copy()
     vectors[:, :, 2] *= np.sign(np.linalg.det(vectors))[:, None]
-    beta = np.arcsin(np.clip(-vectors[:, 2, 0], -1.0, 1.0))
-    # At beta = +-pi/2 only one combination of the other two angles is determined: gamma is set to zero there.
-    locked = np.hypot(vectors[:, 0, 0], vectors[:, 1, 0]) < 1e-12
-    alpha = np.where(
-        locked, np.arctan2(-vectors[:, 0, 1], vectors[:, 1, 1]), np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])
+    alpha = np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])
+    beta = np.arctan2(-vectors[:, 2, 0], np.hypot(vectors[:, 0, 0], vectors[:, 1, 0]))
+    # Gamma is read off Rz(-alpha) W: near beta = +-pi/2 alpha is arbitrary, and gamma makes up for whatever it is.
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    gamma = np.arctan2(
+        sine * vectors[:, 0, 2] - cosine * vectors[:, 1, 2], cosine * vectors[:, 1, 1] - sine * vectors[:, 0, 1]
     )
-    gamma = np.where(locked, 0.0, np.arctan2(vectors[:, 2, 1], vectors[:, 2, 2]))
     return np.column_stack([values, alpha, beta, gamma])
 
 

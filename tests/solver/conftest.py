@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures of the solver's tests: tetrahedral meshes of the cube, made once, of every kind."""
+
+from __future__ import annotations
+
+import pytest
+
+from qc3d_addon.solver.meshing import engine_available, fill_cube
+from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.tetmesh import TetMesh
+
+from .meshes import icosphere, jittered_grid, kuhn_grid, random_delaunay
+
+
+@pytest.fixture(scope="session", params=["kuhn grid", "jittered grid", "random delaunay", "delaunay", "tetwild"])
+def mesh(request: pytest.FixtureRequest) -> TetMesh:
+    """A mesh of the cube: three made here, and a sphere's surroundings by each engine."""
+    made = {"kuhn grid": lambda: kuhn_grid(5), "jittered grid": lambda: jittered_grid(5, seed=1)}
+    made["random delaunay"] = lambda: random_delaunay(150, seed=2)
+    if request.param in made:
+        return made[request.param]()
+    if not engine_available(request.param):
+        pytest.skip(f"the engine {request.param} cannot run here")
+    settings = Settings(engine=request.param, quality="draft")
+    return fill_cube(*icosphere(1), settings).mesh

@@ -15,6 +15,8 @@ from .settings import Settings
 from .tetmesh import Floats, Ints, TetMesh
 from .tetwild import MARGIN, tetwild_mesh, unavailable_reason
 
+SMALLEST_VOLUME = 1e-14  # of the cube's: a tetrahedron of this size and edges of 0.01 has angles near rounding
+
 
 @dataclass(frozen=True, eq=False)
 class FilledCube:
@@ -62,7 +64,8 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
     """
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
-    resolution, notes = RESOLUTIONS[settings.quality], []
+    resolution = RESOLUTIONS[settings.quality]
+    notes: list[str] = []
     if settings.engine != "delaunay":
         try:
             mesh = tetwild_mesh(points, faces, resolution, settings.seed, settings.mesh_time_limit)
@@ -89,8 +92,8 @@ def require_filled_cube(mesh: TetMesh) -> None:
     problem = None
     if not np.isfinite(mesh.points).all():
         problem = "has vertices that are not finite"
-    elif not (mesh.volumes > 0.0).all():
-        problem = f"has {np.count_nonzero(mesh.volumes <= 0.0)} flat or inverted tetrahedra"
+    elif not (mesh.volumes > SMALLEST_VOLUME).all():
+        problem = f"has {np.count_nonzero(mesh.volumes <= SMALLEST_VOLUME)} flat or inverted tetrahedra"
     elif not mesh.on_cube_face[mesh.boundary_faces].all(axis=1).any(axis=1).all():
         problem = "has boundary faces that do not lie on the cube"
     elif abs(float(mesh.volumes.sum()) - 1.0) > 1e-12:

@@ -20,8 +20,9 @@ from .tetmesh import Bools, Floats, Ints
 
 SizeField = Callable[[Floats], Floats]
 
-_OVERSAMPLING = 8.0  # candidates per disk: enough that few holes are left between the disks
-_NEIGHBOURS = 32
+_OVERSAMPLING = 4.0  # candidates per disk: enough that few holes are left between the disks
+_NEIGHBOURS = 16
+_MOST_CANDIDATES = 500_000  # on surfaces folded so densely that more would lie in the disks of others
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class Resolution:
         tree = cKDTree(surface)
 
         def size(positions: Floats) -> Floats:
-            return np.minimum(self.spacing + self.slope * tree.query(positions)[0], self.largest)
+            distance: Floats = np.asarray(tree.query(positions)[0])
+            return np.minimum(self.spacing + self.slope * distance, self.largest, dtype=np.float64)
 
         return size
 
@@ -77,11 +79,14 @@ def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools
     if kept is not None and len(kept):
         open_ = open_[cKDTree(kept).query(candidates)[0] >= radii]
     while open_.size:
-        # A candidate wins the round when no earlier one is inside its disk; the first always wins.
+        # A candidate wins the round when no earlier neighbour is inside its disk; the first always wins.
         distance, neighbour = cKDTree(candidates[open_]).query(candidates[open_], k=min(_NEIGHBOURS, open_.size))
         distance, neighbour = np.reshape(distance, (open_.size, -1)), np.reshape(neighbour, (open_.size, -1))
         order = np.arange(open_.size)
         wins = ~((distance < radii[open_, None]) & (neighbour < order[:, None])).any(axis=1)
+        if not wins.all():
+            # Where more candidates crowd in a disk than neighbours are looked at, winners may still be in conflict.
+            wins[wins] = thin(candidates[open_[wins]], radii[open_[wins]])
         chosen[open_[wins]] = True
         winners = candidates[open_[wins]]
         rest = open_[~wins]
@@ -94,13 +99,16 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
     corners = points[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     total = float(areas.sum())
-    candidates = points[rng.permutation(len(points))]
-    if total > 0.0:
-        count = int(np.ceil(_OVERSAMPLING * total / spacing**2))
+    count = min(int(np.ceil(_OVERSAMPLING * total / spacing**2)), _MOST_CANDIDATES)
+    samples = np.empty((0, 3))
+    if count:
         triangle = rng.choice(len(faces), size=count, p=areas / total)
         weights = rng.dirichlet((1.0, 1.0, 1.0), size=count)
-        candidates = np.concatenate([np.einsum("nk,nka->na", weights, corners[triangle]), candidates])
-    return candidates[thin(candidates, np.full(len(candidates), spacing))]
+        samples = np.einsum("nk,nka->na", weights, corners[triangle])
+        samples = samples[thin(samples, np.full(count, spacing))]
+    vertices = rng.permutation(points)
+    apart: Floats = vertices[thin(vertices, np.full(len(vertices), spacing), samples)]
+    return np.concatenate([samples, apart])
 
 
 def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
@@ -131,17 +139,22 @@ def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
 
 
 def _corners() -> Floats:
-    return np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], indexing="ij"), axis=-1).reshape(8, 3)
+    return _lattice(np.array([0.0, 1.0]), 3)
+
+
+def _lattice(ticks: Floats, dimension: int) -> Floats:
+    lattice: Floats = np.stack(np.meshgrid(*[ticks] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
+    return lattice
 
 
 def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
     """Random points on the cube's edges (1), faces (2) or inside (3), as dense as ``size`` asks, in random order."""
     cells = 32
-    lattice = np.stack(np.meshgrid(*[np.arange(cells)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
+    lattice = _lattice(np.arange(cells) / cells, dimension)
     parts = []
     for free, fixed in _pieces(dimension):
         origin = np.broadcast_to(fixed, (len(lattice), 3)).copy()
-        origin[:, free] = lattice / cells
+        origin[:, free] = lattice
         middle = origin.copy()
         middle[:, free] += 0.5 / cells
         expected = _OVERSAMPLING * (1.0 / cells / size(middle)) ** dimension
@@ -149,8 +162,8 @@ def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
         points = np.repeat(origin, count, axis=0)
         points[:, free] += rng.random((len(points), dimension)) / cells
         parts.append(points)
-    candidates = np.concatenate(parts)
-    return candidates[rng.permutation(len(candidates))]
+    candidates: Floats = np.concatenate(parts)
+    return rng.permutation(candidates)
 
 
 def _pieces(dimension: int) -> list[tuple[list[int], Floats]]:

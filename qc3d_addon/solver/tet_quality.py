@@ -9,10 +9,10 @@ from numpy.random import Generator
 from scipy.spatial import Delaunay
 
 from .sampling import SizeField
-from .tetmesh import OPPOSITE_FACES, Floats, Ints, TetMesh, edge_matrices
+from .tetmesh import OPPOSITE_FACES, Bools, Floats, Ints, TetMesh, edge_matrices
 
-WANTED_ANGLE = 12.0  # degrees; of random tetrahedra about one in twenty is worse
-_SMOOTHING_SWEEPS = 4
+WANTED_ANGLE = 12.0  # degrees
+_SMOOTHING_SWEEPS = 5
 _REPAIR_ROUNDS = 40
 _STEP = 0.3  # of the local distance between samples
 _WALL = 1e-3  # what is not on a face of the cube stays this far from it
@@ -26,7 +26,8 @@ def smallest_dihedral_angles(mesh: TetMesh) -> Floats:
     # The angle between two faces is the supplement of that between their outward normals.
     cosines = -np.einsum("mia,mja->mij", normals, normals)
     first, second = np.triu_indices(4, 1)
-    return np.degrees(np.arccos(np.minimum(cosines[:, first, second].max(axis=1), 1.0)))
+    angles: Floats = np.degrees(np.arccos(np.minimum(cosines[:, first, second].max(axis=1), 1.0)))
+    return angles
 
 
 def triangulate(samples: Floats) -> Ints:
@@ -34,12 +35,13 @@ def triangulate(samples: Floats) -> Ints:
 
     Tetrahedra whose corners share a face of the cube have no volume and are left out; they only ever line the hull.
     """
-    tets = Delaunay(samples).simplices.astype(np.int64)
+    tets: Ints = np.asarray(Delaunay(samples).simplices, dtype=np.int64)
     negative = np.linalg.det(edge_matrices(samples, tets)) < 0.0
     tets[negative] = tets[negative][:, [0, 1, 3, 2]]
     corners = samples[tets]
     flat = ((corners == corners[:, :1]) & ((corners == 0.0) | (corners == 1.0))).all(axis=1).any(axis=1)
-    return np.ascontiguousarray(tets[~flat])
+    solid: Ints = tets[~flat]
+    return solid
 
 
 def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
@@ -61,12 +63,10 @@ def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
     free = (samples != 0.0) & (samples != 1.0)
     for _ in range(_SMOOTHING_SWEEPS):
         samples = _held(samples, _centroids(TetMesh(samples, triangulate(samples)), size), free)
-    best, best_angle = None, -1.0
+    mesh = TetMesh(samples, triangulate(samples))
+    angles = smallest_dihedral_angles(mesh)
+    best, best_angle = mesh, angles.min()
     for _ in range(_REPAIR_ROUNDS):
-        mesh = TetMesh(samples, triangulate(samples))
-        angles = smallest_dihedral_angles(mesh)
-        if angles.min() > best_angle:
-            best, best_angle = mesh, angles.min()
         slivers = mesh.tets[angles < WANTED_ANGLE]
         if not len(slivers):
             break
@@ -76,7 +76,10 @@ def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
         moved = samples.copy()
         moved[chosen] += _STEP * size(samples[chosen])[:, None] * direction
         samples = _held(samples, moved, free)
-    assert best is not None
+        mesh = TetMesh(samples, triangulate(samples))
+        angles = smallest_dihedral_angles(mesh)
+        if angles.min() > best_angle:
+            best, best_angle = mesh, angles.min()
     return best
 
 
@@ -90,6 +93,6 @@ def _centroids(mesh: TetMesh, size: SizeField) -> Floats:
     return np.stack(sums, axis=1) / total[:, None]
 
 
-def _held(before: Floats, after: Floats, free: np.ndarray) -> Floats:
+def _held(before: Floats, after: Floats, free: Bools) -> Floats:
     """Moved samples, except for the coordinates held by the cube's faces."""
     return np.where(free, np.clip(after, _WALL, 1.0 - _WALL), before)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import signal
@@ -16,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .tet_quality import triangulate
 from .errors import MeshingError
 from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
+from .tet_quality import triangulate
 from .tetmesh import Floats, Ints, TetMesh
 
 MARGIN = 0.1  # the surface keeps this far from the cube's faces
@@ -123,7 +124,8 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
         raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}. Choose the engine delaunay or auto.")
     with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
         folder = Path(name)
-        np.savez(folder / "input.npz", **arrays)  # type: ignore[arg-type]
+        for key, array in arrays.items():
+            np.save(folder / f"{key}.npy", array, allow_pickle=False)
         numpy_folder = Path(np.__file__).resolve().parent.parent
         command = [_interpreter(), "-I", CHILD, _wrapper(), numpy_folder, folder, time_limit]
         status, message = _run([str(part) for part in command], folder / "errors.txt", time_limit)
@@ -166,10 +168,8 @@ def _kill_group(process: subprocess.Popen[bytes]) -> None:
     if sys.platform == "win32":
         process.kill()
     else:
-        try:
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is gone
             os.killpg(process.pid, signal.SIGKILL)
-        except (ProcessLookupError, PermissionError):
-            pass  # the group is gone
     process.wait()
 
 

@@ -9,8 +9,8 @@ files hold::
     python -I tetwild_child.py WRAPPER NUMPY FOLDER SECONDS
 
 WRAPPER is the file of pytetwild's compiled module, loaded on its own because the package around it needs pyvista;
-NUMPY the folder that holds numpy; FOLDER is where ``input.npz`` lies and ``output.npz`` goes; SECONDS is a limit that
-holds even if nobody is left to enforce it.
+NUMPY is the folder that holds numpy; FOLDER is where the input's .npy files lie and ``output.npz`` goes; SECONDS is
+a limit that holds even if nobody is left to enforce it.
 """
 
 from __future__ import annotations
@@ -31,8 +31,7 @@ def main(arguments: list[str]) -> None:
     sys.path.append(numpy_folder)
     import numpy as np
 
-    with np.load(folder / "input.npz", allow_pickle=False) as archive:
-        arrays = dict(archive)
+    arrays = {file.stem: np.load(file, allow_pickle=False) for file in folder.glob("*.npy")}
     # The compiled function takes its arguments by position only; the comments are the names pytetwild gives them.
     points, tets = _load(wrapper).tetrahedralize_mesh(
         arrays["points"],

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tomllib
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from importlib import metadata
@@ -168,10 +169,12 @@ def _whole_number(text: str) -> int:
 
 
 def _version() -> str:
-    try:
-        return metadata.version("qc3d")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
+    """The version of the manifest that came with the code: inside the extension, above the package in a checkout."""
+    package = Path(__file__).parent
+    for manifest in (package / "blender_manifest.toml", package.parent / "blender_manifest.toml"):
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
+    return metadata.version("qc3d")
 
 
 class _Parser(argparse.ArgumentParser):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,11 +19,14 @@ _FORMAT = "{desc:8}{percentage:4.0f}% |{bar:40}| {elapsed}"
 
 
 class StageBars:
-    """Draws the progress that it is called with; silent where standard error is no terminal."""
+    """Draws the progress that it is called with; silent where standard error is no terminal.
+
+    Silent too inside Blender, whose own Python comes without tqdm.
+    """
 
     def __init__(self) -> None:
         self._bar: tqdm[None] | None = None
-        self._visible = sys.stderr.isatty()
+        self._visible = sys.stderr.isatty() and find_spec("tqdm") is not None
 
     def __call__(self, progress: Progress) -> None:
         if not self._visible:
@@ -52,7 +56,6 @@ class StageBars:
 
 
 def _new_bar(stage: str) -> tqdm[None]:
-    # Blender's own Python has no tqdm, and needs none: there the window shows the progress.
     from tqdm import tqdm
 
     bar: tqdm[None] = tqdm(total=1.0, bar_format=_FORMAT, file=sys.stderr)

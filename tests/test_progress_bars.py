@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from typing import NamedTuple
 
 import pytest
@@ -49,3 +50,12 @@ def test_nothing_is_drawn_without_a_terminal(capsys: pytest.CaptureFixture[str])
         for report in REPORTS:
             bars(report)
     assert capsys.readouterr() == ("", "")
+
+
+def test_nothing_is_drawn_without_tqdm(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setitem(sys.modules, "tqdm", None)
+    with StageBars() as bars:
+        bars(REPORTS[0])
+    assert terminal.getvalue() == ""

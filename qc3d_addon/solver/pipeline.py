@@ -169,8 +169,11 @@ class LinearFrames:
         """(n, 3) positions in the keys' coordinates, and the folds of the map at this time."""
         prepared = self._prepared
         values = self._maps.at(time)
-        positions = prepared.landmarks @ values + time * self._missed
-        return prepared.embedding.from_cube(positions, time), prepared.folds(values)
+        positions = prepared.embedding.from_cube(prepared.landmarks @ values + time * self._missed, time)
+        # A part that both keys leave in place must not breathe with the map around it.
+        still = (prepared.pair.key0 == prepared.pair.key1).all(axis=1)
+        positions[still] = prepared.pair.key0[still]
+        return positions, prepared.folds(values)
 
 
 def _staged(stage: str, work: Generator[float, None, T]) -> Steps[T]:

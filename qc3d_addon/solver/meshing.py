@@ -86,12 +86,14 @@ def require_filled_cube(mesh: TetMesh) -> None:
     Raises
     ------
     MeshingError
-        If a vertex is not finite, a tetrahedron is flat or inverted, faces do not match, the boundary is not exactly
-        on the cube's faces, or the volumes do not sum to 1.
+        If a vertex is not finite or belongs to no tetrahedron, a tetrahedron is flat or inverted, faces do not match,
+        the boundary is not exactly on the cube's faces, or the volumes do not sum to 1.
     """
     problem = None
     if not np.isfinite(mesh.points).all():
         problem = "has vertices that are not finite"
+    elif not np.isin(np.arange(len(mesh.points)), mesh.tets).all():
+        problem = "has vertices that belong to no tetrahedron"
     elif not (mesh.volumes > SMALLEST_VOLUME).all():
         problem = f"has {np.count_nonzero(mesh.volumes <= SMALLEST_VOLUME)} flat or inverted tetrahedra"
     elif not mesh.on_cube_face[mesh.boundary_faces].all(axis=1).any(axis=1).all():

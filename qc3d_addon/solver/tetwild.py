@@ -80,7 +80,9 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
     positions, tets = run_child(arrays, time_limit)
     for exact in (0.0, 1.0):
         positions[np.abs(positions - exact) < 1e-9] = exact
-    return TetMesh(positions, tets)
+    # The two vertices come back without tetrahedra: equations on the mesh would be singular there.
+    used, corners = np.unique(tets, return_inverse=True)
+    return TetMesh(positions[used], corners.reshape(-1, 4).astype(np.int64))
 
 
 def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:

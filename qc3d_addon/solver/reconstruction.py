@@ -57,7 +57,7 @@ class Reconstructor:
         values : (N, 3)
             Read only where a coordinate is held: on its two cube faces and at the landmarks.
         start : (N, 3), optional
-            A guess that shortens the iteration.
+            A guess that shortens the iteration; the identity where it is not given.
 
         Returns
         -------
@@ -70,7 +70,7 @@ class Reconstructor:
         """
         elements = stiffness_elements(self._mesh.volumes, self._mesh.gradients, conductivity(stretch))
         matrix = self._pattern.assemble(elements)
-        result = np.array(values if start is None else start, dtype=np.float64)
+        result = np.array(self._mesh.points if start is None else start, dtype=np.float64)
         for coordinate in range(3):
             held = self._held[:, coordinate]
             result[held, coordinate] = values[held, coordinate]

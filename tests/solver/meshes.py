@@ -125,7 +125,7 @@ def twisted(points: Floats, angle: float) -> Floats:
 
 
 def bent(points: Floats, angle: float) -> Floats:
-    """Points bent in the x-z plane by ``angle`` (radians) in all, the middle of the axis keeping its length and place."""
+    """Points bent in the x-z plane by ``angle`` (radians) in all, their axis as long as before, its middle in place."""
     low, high = points[:, 2].min(), points[:, 2].max()
     radius = (high - low) / angle
     along = (points[:, 2] - 0.5 * (low + high)) / radius

@@ -15,6 +15,8 @@ from .tetmesh import Bools, Floats, Ints
 
 STILL_TOLERANCE = 1e-6
 MARGIN = 0.17
+# Covariances whose second singular value is below this part of the first belong to points in a line.
+_LINE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +43,15 @@ class RigidMotion:
     def between(cls, source: Floats, target: Floats, weights: Floats) -> RigidMotion:
         """Best rigid motion of the points ``source`` (n, 3) onto ``target`` in the weighted least-squares sense.
 
-        Weights (n,) are positive. Kabsch (1976).
+        Weights (n,) are positive. Kabsch (1976). Points in one line turn no further than their line does.
         """
         weights = weights / weights.sum()
         source_centre, target_centre = weights @ source, weights @ target
         covariance = (target - target_centre).T @ (weights[:, None] * (source - source_centre))
-        rotation = closest_rotations(covariance[None])
-        turn = rotation_vectors(rotation)[0]
-        shift = target_centre - rotation[0] @ source_centre
+        turn = _turn_of_line(covariance)
+        if turn is None:
+            turn = rotation_vectors(closest_rotations(covariance[None]))[0]
+        shift = target_centre - rotation_matrices(turn[None])[0] @ source_centre
         return cls(turn, np.linalg.solve(_translation_factor(turn), shift))
 
     def apply(self, points: Floats, time: float = 1.0) -> Floats:
@@ -62,14 +65,26 @@ class RigidMotion:
         return self.apply(points, -1.0)
 
 
+def _turn_of_line(covariance: Floats) -> Floats | None:
+    """Shortest rotation vector between two directions for a covariance of rank 1, which leaves the spin free."""
+    left, sizes, right = np.linalg.svd(covariance)
+    if sizes[1] > _LINE * sizes[0]:
+        return None
+    source, target = right[0], left[:, 0]
+    axis, cosine = np.cross(source, target), float(source @ target)
+    sine = float(np.linalg.norm(axis))
+    # Opposite directions: half a turn about anything across the line.
+    axis = right[1] if sine < _LINE else axis / sine
+    return np.asarray(np.arctan2(sine, cosine) * axis)
+
+
 def _translation_factor(turn: Floats) -> Floats:
     """The matrix V(q) with b = V(q) v for the twist (q, v): the integral of exp(s [q]x) over s in 0..1."""
     angle = float(np.linalg.norm(turn))
     cross = np.array([[0.0, -turn[2], turn[1]], [turn[2], 0.0, -turn[0]], [-turn[1], turn[0], 0.0]])
-    if angle < 1e-4:
-        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    else:
-        first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    # (1 - cos a) / a^2 without its cancellation.
+    first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    second = 1.0 / 6.0 - angle**2 / 120.0 if angle < 1e-4 else (angle - np.sin(angle)) / angle**3
     return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
 
 
@@ -125,10 +140,8 @@ class Embedding:
 
     @cached_property
     def key1(self) -> Floats:
-        """(n, 3): the second key in cube units, without its rigid motion; still vertices exactly as in the first."""
-        aligned = self.to_cube(self.motion.undo(self.pair.key1))
-        aligned[self.still] = self.key0[self.still]
-        return aligned
+        """(n, 3): the second key in cube units, without its rigid motion."""
+        return self.to_cube(self.motion.undo(self.pair.key1))
 
     @cached_property
     def weights(self) -> Floats:

@@ -5,12 +5,17 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
 
 from qc3d_addon.solver.meshing import engine_available, fill_cube
 from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.tetmesh import TetMesh
 
 from .meshes import icosphere, jittered_grid, kuhn_grid, random_delaunay
+
+# On a busy machine any example can take long; how long a test may take is decided by its number of examples.
+settings.register_profile("solver", deadline=None)
+settings.load_profile("solver")
 
 
 @pytest.fixture(scope="session", params=["kuhn grid", "jittered grid", "random delaunay", "delaunay", "tetwild"])
@@ -22,5 +27,4 @@ def mesh(request: pytest.FixtureRequest) -> TetMesh:
         return made[request.param]()
     if not engine_available(request.param):
         pytest.skip(f"the engine {request.param} cannot run here")
-    settings = Settings(engine=request.param, quality="draft")
-    return fill_cube(*icosphere(1), settings).mesh
+    return fill_cube(*icosphere(1), Settings(engine=request.param, quality="draft")).mesh

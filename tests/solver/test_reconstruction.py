@@ -186,7 +186,7 @@ waves = st.lists(st.integers(0, 3), min_size=9, max_size=9).map(lambda found: np
 amplitudes = st.lists(st.floats(-0.03, 0.03), min_size=3, max_size=3)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(amplitudes, waves), min_size=1, max_size=3), st.integers(0, 2**32 - 1))
 def test_random_smooth_bijections_come_back(displacements: list[tuple[list[float], Ints]], seed: int) -> None:
     mesh = jittered_grid(5, seed)

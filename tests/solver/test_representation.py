@@ -44,7 +44,7 @@ def assert_survives_eigen_form(stretch: Floats) -> None:
     assert (np.abs(numbers[:, [3, 5]]) <= np.pi).all()
     assert (np.abs(numbers[:, 4]) <= 0.5 * np.pi).all()
     largest = np.abs(numbers[:, 0]).max()
-    np.testing.assert_allclose(from_eigen_form(numbers), stretch, atol=EXACT * largest)
+    np.testing.assert_allclose(from_eigen_form(numbers), stretch, rtol=0.0, atol=EXACT * largest)
 
 
 class TestPolarDecomposition:
@@ -52,21 +52,22 @@ class TestPolarDecomposition:
         expected = stretches(100)
         turned = Rotation.random(100, random_state=1).as_matrix()
         rotation, stretch = polar_decomposition(turned @ expected)
-        np.testing.assert_allclose(rotation, turned, atol=1e-12)
-        np.testing.assert_allclose(stretch, expected, atol=1e-12)
+        np.testing.assert_allclose(rotation, turned, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(stretch, expected, rtol=0.0, atol=1e-12)
         np.testing.assert_array_equal(stretch, stretch.transpose(0, 2, 1))
 
     def test_stretch_squared_is_the_metric(self) -> None:
         jacobians = np.eye(3) + 0.3 * np.random.default_rng(2).normal(size=(200, 3, 3))
         stretch = polar_decomposition(jacobians).stretch
-        np.testing.assert_allclose(stretch @ stretch, jacobians.transpose(0, 2, 1) @ jacobians, atol=1e-12)
+        np.testing.assert_allclose(stretch @ stretch, jacobians.transpose(0, 2, 1) @ jacobians, rtol=0.0, atol=1e-12)
 
     def test_folds_show_in_the_smallest_eigenvalue_alone(self) -> None:
         folded = Rotation.random(20, random_state=3).as_matrix() @ np.diag([3.0, 2.0, -0.5])
         rotation, stretch = polar_decomposition(folded)
-        np.testing.assert_allclose(np.linalg.det(rotation), 1.0, atol=EXACT)
-        np.testing.assert_allclose(np.linalg.eigvalsh(stretch), np.tile([-0.5, 2.0, 3.0], (20, 1)), atol=1e-12)
-        np.testing.assert_allclose(rotation @ stretch, folded, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=0.0, atol=EXACT)
+        expected = np.tile([-0.5, 2.0, 3.0], (20, 1))
+        np.testing.assert_allclose(np.linalg.eigvalsh(stretch), expected, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(rotation @ stretch, folded, rtol=0.0, atol=1e-12)
 
 
 class TestUpperTriangle:
@@ -111,22 +112,22 @@ class TestEigenForm:
     ) -> None:
         vectors = euler(alpha, beta, gamma)
         stretch = from_eigen_form(np.array([[*values, alpha, beta, gamma]]))
-        np.testing.assert_allclose(stretch[0], (vectors * np.array(values)) @ vectors.T, atol=1e-12)
+        np.testing.assert_allclose(stretch[0], (vectors * np.array(values)) @ vectors.T, rtol=0.0, atol=1e-12)
         assert_survives_eigen_form(0.5 * (stretch + stretch.transpose(0, 2, 1)))
 
     def test_one_form_to_the_other_and_back(self) -> None:
         triangle = upper_triangle(polar_decomposition(stretches(100)).stretch)
         there = eigen_form(from_upper_triangle(triangle))
-        np.testing.assert_allclose(upper_triangle(from_eigen_form(there)), triangle, atol=1e-11)
+        np.testing.assert_allclose(upper_triangle(from_eigen_form(there)), triangle, rtol=0.0, atol=1e-11)
         again = eigen_form(from_eigen_form(there))
-        np.testing.assert_allclose(again[:, :3], there[:, :3], atol=1e-11)
+        np.testing.assert_allclose(again[:, :3], there[:, :3], rtol=0.0, atol=1e-11)
 
     def test_eigenvectors_are_a_rotation_times_signs(self) -> None:
         stretch = stretches(100)
         numbers = eigen_form(stretch)
         for matrix, (value, *_, alpha, beta, gamma) in zip(stretch, numbers, strict=True):
             first = euler(alpha, beta, gamma)[:, 0]
-            np.testing.assert_allclose(matrix @ first, value * first, atol=1e-11)
+            np.testing.assert_allclose(matrix @ first, value * first, rtol=0.0, atol=1e-11)
 
 
 class TestConductivity:

@@ -33,15 +33,15 @@ def main(folder: Path) -> None:
 def build_limb() -> None:
     """An arm along the x axis, in metres: chest, upper arm, forearm, and a hand with a thumb, as one closed surface."""
     pieces = [
-        _ball((-0.42, 0.0, -0.02), (0.48, 0.36, 0.6)),
-        _ball((0.0, 0.0, 0.25), (0.36, 0.34, 0.36)),
-        _ball((1.5, 0.0, 0.25), (0.22, 0.21, 0.21)),
-        _ball((2.72, 0.0, 0.25), (0.15, 0.13, 0.14)),
-        _ball((3.08, 0.0, 0.25), (0.36, 0.21, 0.1)),
-        _tapered((0.0, 0.0, 0.25), (1.5, 0.0, 0.25), 0.27, 0.2),
-        _tapered((1.5, 0.0, 0.25), (2.72, 0.0, 0.25), 0.22, 0.13),
-        _tapered((2.85, -0.1, 0.25), (3.15, -0.36, 0.27), 0.085, 0.06),
-        _ball((3.15, -0.36, 0.27), (0.07, 0.065, 0.065)),
+        _ball((-0.42, 0.0, -0.02), (0.48, 0.36, 0.62)),
+        _ball((0.0, 0.0, 0.25), (0.4, 0.36, 0.38)),
+        _ball((1.3, 0.0, 0.25), (0.27, 0.25, 0.25)),
+        _ball((2.3, 0.0, 0.25), (0.18, 0.16, 0.18)),
+        _ball((2.66, 0.0, 0.27), (0.4, 0.13, 0.27)),
+        _tapered((0.0, 0.0, 0.25), (1.3, 0.0, 0.25), 0.34, 0.25),
+        _tapered((1.3, 0.0, 0.25), (2.3, 0.0, 0.25), 0.27, 0.17),
+        _tapered((2.4, 0.0, 0.3), (2.62, 0.0, 0.68), 0.12, 0.09),
+        _ball((2.62, 0.0, 0.68), (0.1, 0.09, 0.1)),
     ]
     arm = _joined(pieces, "Arm")
     remesh = arm.modifiers.new("Remesh", "REMESH")
@@ -160,7 +160,7 @@ def _swept(points: Floats, origin: Floats, bend: float, twist: float) -> Floats:
     before the twist's region, the chest and the shoulder, does not move at all.
     """
     stations = np.linspace(0.0, 4.0, 4001)
-    angles = bend * _rise(stations, 1.05, 2.0)
+    angles = bend * _rise(stations, 0.85, 1.85)
     steps = 0.5 * np.diff(stations) * np.stack([np.cos(angles[1:]) + np.cos(angles[:-1]),
                                                 np.sin(angles[1:]) + np.sin(angles[:-1])])  # fmt: skip
     along, up = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
@@ -168,9 +168,9 @@ def _swept(points: Floats, origin: Floats, bend: float, twist: float) -> Floats:
     moved = points.copy()
     arm = points[:, 0] > 0.45
     x, y, z = (points[arm] - origin).T
-    turn = twist * _rise(x, 0.45, 2.75)
+    turn = twist * _rise(x, 0.45, 2.35)
     y, z = np.cos(turn) * y - np.sin(turn) * z, np.sin(turn) * y + np.cos(turn) * z
-    angle = bend * _rise(x, 1.05, 2.0)
+    angle = bend * _rise(x, 0.85, 1.85)
     axis_x, axis_z = np.interp(x, stations, along), np.interp(x, stations, up)
     moved[arm] = origin + np.stack([axis_x - np.sin(angle) * z, y, axis_z + np.cos(angle) * z], axis=1)
     return moved

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -25,7 +25,7 @@ class StageBars:
     """
 
     def __init__(self) -> None:
-        self._bar: tqdm[None] | None = None
+        self._bar: tqdm[NoReturn] | None = None
         self._visible = sys.stderr.isatty() and find_spec("tqdm") is not None
 
     def __call__(self, progress: Progress) -> None:
@@ -55,10 +55,10 @@ class StageBars:
             self._bar = None
 
 
-def _new_bar(stage: str) -> tqdm[None]:
+def _new_bar(stage: str) -> tqdm[NoReturn]:
     from tqdm import tqdm
 
-    bar: tqdm[None] = tqdm(total=1.0, bar_format=_FORMAT, file=sys.stderr)
+    bar: tqdm[NoReturn] = tqdm(total=1.0, bar_format=_FORMAT, file=sys.stderr)
     bar.desc = stage  # set_description would add a colon, which the alignment does not expect
     bar.refresh()
     return bar

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shipped demo files are what their script makes, and worth baking."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from qc3d_addon.blender.mesh_data import key_coordinates, triangles
+
+FILES = {
+    "limb": ("Arm", ["Basis", "Bend 90", "Twist 120", "Bend and twist"]),
+    "suzanne": ("Suzanne", ["Basis", "Jaw drop", "Ears back", "Surprise"]),
+}
+
+
+@pytest.fixture(scope="module")
+def made_again(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("assets")
+    command = [sys.executable, str(repository / "assets" / "make_assets.py"), str(folder)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr
+    return folder
+
+
+def shapes(path: Path, name: str) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Names of the shape keys, their positions (k, n, 3), and the triangles."""
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects[name]
+    names = obj.data.shape_keys.key_blocks.keys()
+    return names, np.stack([key_coordinates(obj, key) for key in names]), triangles(obj.data)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_shipped_file_is_what_the_script_makes(name: str, repository: Path, made_again: Path) -> None:
+    obj, expected = FILES[name]
+    names, positions, faces = shapes(repository / "assets" / f"{name}.blend", obj)
+    names_again, positions_again, faces_again = shapes(made_again / f"{name}.blend", obj)
+    assert names == names_again == expected
+    np.testing.assert_array_equal(faces, faces_again)
+    np.testing.assert_allclose(positions, positions_again, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_part_of_it_stays_still_and_every_key_moves(name: str, repository: Path) -> None:
+    _, positions, _ = shapes(repository / "assets" / f"{name}.blend", FILES[name][0])
+    motion = np.linalg.norm(positions[1:] - positions[0], axis=2)
+    diagonal = np.linalg.norm(np.ptp(positions[0], axis=0))
+    assert ((motion == 0.0).mean(axis=1) > 0.3).all()
+    assert (motion.max(axis=1) > 0.05 * diagonal).all()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_it_is_small(name: str, repository: Path) -> None:
+    assert (repository / "assets" / f"{name}.blend").stat().st_size < 400_000

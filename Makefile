@@ -20,7 +20,7 @@ BIN := $(VENV)/bin
 demo: $(VENV)/installed
 	rm -rf demo && mkdir demo
 	$(BIN)/qc3d bake assets/limb.blend --object Arm --from Basis --to "Bend and twist" --frames 5 \
-	    --output demo/limb.blend --report demo/limb.json
+	    --mode linear --output demo/limb.blend --report demo/limb.json
 	$(BIN)/python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --straight \
 	    --object Arm --from Basis --to "Bend and twist" --output demo/limb.png
 	@echo "Look at demo/limb.png, open demo/limb.blend in Blender, read demo/limb.json."

@@ -37,7 +37,7 @@ def refusal(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_frames_run_from_key_to_key(bar_file: Path, bar: dict[str, np.ndarray], tmp_path: Path) -> None:
     output, report = tmp_path / "frames.npz", tmp_path / "report.json"
-    assert interpolate(bar_file, output, "--frames", "3", "--report", str(report)) == 0
+    assert interpolate(bar_file, output, "--frames", "3", "--mode", "linear", "--report", str(report)) == 0
 
     with np.load(output, allow_pickle=False) as stored:
         frames, times = stored["frames"], stored["times"]

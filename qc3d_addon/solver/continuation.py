@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 
 import numpy as np
 
 from .foldfree import FoldFreeFitter
+from .representation import polar_decomposition
+from .rotations import nearest_branch, rotation_vectors
 from .surface_path import SurfacePath
 from .tetmesh import Floats
 
@@ -17,7 +20,23 @@ _STEP_ITERATIONS = 12
 _LAST_ITERATIONS = 40
 
 
-def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Generator[float, None, Floats]:
+@dataclass(frozen=True, eq=False)
+class FollowedPath:
+    """The maps on the way to the second key, and how the tetrahedra turned.
+
+    Parameters
+    ----------
+    maps : (K + 1, N, 3)
+        Values of the maps at the times 0, 1/K, ..., 1: the identity first, the fitted map last, none with folds.
+    turns : (M, 3)
+        Rotation vectors of the tetrahedra in radians, followed from step to step: angles may exceed pi.
+    """
+
+    maps: Floats
+    turns: Floats
+
+
+def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Generator[float, None, FollowedPath]:
     """Fit the map to the second key by way of the shapes between.
 
     The number of steps follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
@@ -34,15 +53,17 @@ def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Gene
     ------
     float
         The part that is done, 0..1.
-
-    Returns
-    -------
-    (N, 3) values of a map without folds.
     """
+    mesh = fitter.mesh
     angles = np.degrees(np.linalg.norm(path.turns, axis=1))
     steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
-    values = fitter.mesh.points
-    for step in range(1, steps):
-        values = fitter.fit(values, path.positions(step / steps), _STEP_ITERATIONS)
+    maps = np.empty((steps + 1, *mesh.points.shape))
+    maps[0] = mesh.points
+    turns = np.zeros((len(mesh.tets), 3))
+    for step in range(1, steps + 1):
+        last = step == steps
+        target = key1 if last else path.positions(step / steps)
+        maps[step] = fitter.fit(maps[step - 1], target, _LAST_ITERATIONS if last else _STEP_ITERATIONS)
+        turns = nearest_branch(rotation_vectors(polar_decomposition(mesh.jacobians(maps[step])).rotation), turns)
         yield step / steps
-    return fitter.fit(values, key1, _LAST_ITERATIONS)
+    return FollowedPath(maps, turns)

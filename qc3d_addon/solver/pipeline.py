@@ -17,11 +17,12 @@ from .continuation import follow_path
 from .embedding import Embedding
 from .errors import InputError
 from .foldfree import FoldFreeFitter
-from .interpolation import LinearMaps
 from .keypair import KeyPair
+from .linear import LinearFrames
 from .location import interpolation_matrix
 from .memory import peak_memory_mb
 from .meshing import fill_cube
+from .natural import NaturalFrames
 from .prepared import PreparedMap
 from .settings import Settings
 from .surface_path import SurfacePath
@@ -106,9 +107,10 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     yield Progress("locate", 1.0)
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        mapped = yield from _staged("fit", follow_path(fitter, SurfacePath(embedding), embedding.key1))
+        path = SurfacePath(embedding, settings.stretch)
+        followed = yield from _staged("fit", follow_path(fitter, path, embedding.key1))
     yield Progress("fit", 1.0)
-    return PreparedMap(pair, filled.mesh, mapped, filled.engine, filled.notes, seconds)
+    return PreparedMap(pair, filled.mesh, followed.maps, followed.turns, filled.engine, filled.notes, seconds)
 
 
 def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> Steps[Bake]:
@@ -125,55 +127,39 @@ def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> S
     seconds = dict(prepared.seconds)
     yield Progress("factor", 0.0)
     with _timed(seconds, "factor"):
-        frame_maker = LinearFrames(prepared)
+        maker = LinearFrames(prepared) if settings.mode == "linear" else NaturalFrames(prepared, settings.stretch)
     yield Progress("factor", 1.0)
-    frames = np.empty((len(wanted), *prepared.pair.key0.shape))
-    folds = []
-    key_errors = [0.0]
     with _timed(seconds, "frames"):
-        for index, time in enumerate(wanted):
-            yield Progress("frames", index / len(wanted))
-            frames[index], map_folds = frame_maker.at(float(time))
-            folds.append(map_folds)
-            if time in (0.0, 1.0):
-                # Computed like every frame, measured, and only then replaced by the key itself.
-                key = prepared.pair.key1 if time else prepared.pair.key0
-                key_errors.append(float(np.abs(frames[index] - key).max()))
-                frames[index] = key
+        made = yield from _staged("frames", maker.frames(wanted))
     yield Progress("frames", 1.0)
+    frames = np.stack([frame.positions for frame in made])
+    key_error = _replace_by_keys(frames, wanted, prepared.pair) / prepared.pair.diagonal
     report = {
         "engine": prepared.engine,
         "mode": settings.mode,
+        "stretch": settings.stretch,
         "quality": settings.quality,
         "vertices": len(prepared.pair.key0),
         "tetrahedra": len(prepared.mesh.tets),
-        "folds": {"map": prepared.folds(prepared.mapped), "frames": folds},
+        "folds": {"map": prepared.folds(prepared.mapped), "frames": [frame.folds for frame in made]},
+        "certificates": [frame.certificate(float(time)) for frame, time in zip(made, wanted, strict=True)],
         "residual": prepared.landmark_residual(),
-        "key_error": max(key_errors) / prepared.pair.diagonal,
+        "key_error": key_error,
         "seconds": seconds,
         "peak_memory_mb": peak_memory_mb(),
-        "notes": list(prepared.notes),
+        "notes": [*prepared.notes, *maker.notes],
     }
     return Bake(wanted, frames, report)
 
 
-class LinearFrames:
-    """Frames of mode ``linear``: the rebuilt maps at the landmarks, what the fit missed blended in."""
-
-    def __init__(self, prepared: PreparedMap) -> None:
-        self._prepared = prepared
-        self._maps = LinearMaps(prepared.mesh, prepared.mapped)
-        self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
-
-    def at(self, time: float) -> tuple[Floats, int]:
-        """(n, 3) positions in the keys' coordinates, and the folds of the map at this time."""
-        prepared = self._prepared
-        values = self._maps.at(time)
-        positions = prepared.embedding.from_cube(prepared.landmarks @ values + time * self._missed, time)
-        # A part that both keys leave in place must not breathe with the map around it.
-        still = (prepared.pair.key0 == prepared.pair.key1).all(axis=1)
-        positions[still] = prepared.pair.key0[still]
-        return positions, prepared.folds(values)
+def _replace_by_keys(frames: Floats, times: Floats, pair: KeyPair) -> float:
+    """Put the keys themselves at 0 and 1; returns how far the frames computed there were from them."""
+    error = 0.0
+    for time, key in ((0.0, pair.key0), (1.0, pair.key1)):
+        for index in np.flatnonzero(times == time):
+            error = max(error, float(np.abs(frames[index] - key).max()))
+            frames[index] = key
+    return error
 
 
 def _staged(stage: str, work: Generator[float, None, T]) -> Steps[T]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from .embedding import Embedding
+from .foldfree import FoldFreeFitter
 from .keypair import KeyPair
 from .location import interpolation_matrix
 from .rotations import determinants
@@ -26,8 +27,11 @@ class PreparedMap:
     pair : KeyPair
     mesh : TetMesh
         The filled unit cube.
-    mapped : (N, 3)
-        Values of the map at the mesh's vertices, cube units.
+    maps : (K + 1, N, 3)
+        Values at the mesh's vertices, cube units, of maps without folds along the way, evenly spaced in time: the
+        identity first, the map fitted to the second key last.
+    turns : (M, 3)
+        Rotation vectors of the tetrahedra of the last map, radians, in the branch that the motion takes.
     engine : str
         The engine that made the mesh.
     notes : tuple of str
@@ -38,10 +42,16 @@ class PreparedMap:
 
     pair: KeyPair
     mesh: TetMesh
-    mapped: Floats
+    maps: Floats
+    turns: Floats
     engine: str
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def mapped(self) -> Floats:
+        """(N, 3): values of the fitted map."""
+        return np.asarray(self.maps[-1])
 
     @cached_property
     def embedding(self) -> Embedding:
@@ -52,6 +62,11 @@ class PreparedMap:
     def landmarks(self) -> csr_array:
         """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
         return interpolation_matrix(self.mesh, self.embedding.key0)
+
+    @cached_property
+    def fitter(self) -> FoldFreeFitter:
+        """Fits further maps of the same mesh."""
+        return FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
 
     def folds(self, values: Floats) -> int:
         """Tetrahedra that the map with these values (N, 3) does not keep positively oriented."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from .errors import InputError
+from .stretch import StretchLaw
 
-Mode = Literal["linear"]
+Mode = Literal["natural", "linear"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["draft", "normal", "fine"]
 
@@ -21,7 +22,9 @@ class Settings:
     Parameters
     ----------
     mode
-        How the map is interpolated: ``linear`` is the paper's scheme.
+        How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme.
+    stretch
+        How ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
     engine
         What fills the cube: ``tetwild``, ``delaunay``, or ``auto`` (tetwild where it can run).
     quality
@@ -32,15 +35,16 @@ class Settings:
         Seconds after which a tetwild run is stopped.
     """
 
-    mode: Mode = "linear"
+    mode: Mode = "natural"
+    stretch: StretchLaw = "linear"
     engine: Engine = "auto"
     quality: Quality = "normal"
     seed: int = 0
     mesh_time_limit: float = 120.0
 
     def __post_init__(self) -> None:
-        for name, choices in (("mode", get_args(Mode)), ("engine", get_args(Engine)), ("quality", get_args(Quality))):
-            value = getattr(self, name)
+        for name, kind in (("mode", Mode), ("stretch", StretchLaw), ("engine", Engine), ("quality", Quality)):
+            value, choices = getattr(self, name), get_args(kind)
             if value not in choices:
                 raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
         if not self.mesh_time_limit > 0.0:

@@ -44,7 +44,8 @@ def to_bytes(prepared: PreparedMap) -> bytes:
         header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
         points=prepared.mesh.points,
         tets=prepared.mesh.tets.astype(np.int32),
-        mapped=prepared.mapped,
+        maps=prepared.maps,
+        turns=prepared.turns,
     )
     return buffer.getvalue()
 
@@ -62,7 +63,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
             header = json.loads(bytes(stored["header"]))
             version, owner = header["version"], header["fingerprint"]
             engine, notes = str(header["engine"]), tuple(str(note) for note in header["notes"])
-            points, mapped = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "mapped"))
+            points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
             tets = np.asarray(stored["tets"], dtype=np.int64)
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(_DAMAGED) from error
@@ -72,12 +73,14 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
         )
     if owner != fingerprint(pair):
         raise InputError("The stored map belongs to other keys or another mesh; prepare the keys again.")
-    if points.ndim != 2 or points.shape[1] != 3 or mapped.shape != points.shape or not np.isfinite(mapped).all():
+    if points.ndim != 2 or points.shape[1] != 3 or maps.ndim != 3 or maps.shape[1:] != points.shape or len(maps) < 2:
         raise InputError(_DAMAGED)
     if tets.ndim != 2 or tets.shape[1] != 4 or not len(tets) or tets.min() < 0 or tets.max() >= len(points):
         raise InputError(_DAMAGED)
+    if turns.shape != (len(tets), 3) or not (np.isfinite(maps).all() and np.isfinite(turns).all()):
+        raise InputError(_DAMAGED)
     mesh = TetMesh(points, tets)
     # Written so that a volume that is not a number counts as damage too.
-    if not (mesh.volumes.min() > 0.0 and determinants(mesh.jacobians(mapped)).min() > 0.0):
+    if not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps) or not mesh.volumes.min() > 0.0:
         raise InputError(_DAMAGED)
-    return PreparedMap(pair, mesh, mapped, engine, notes)
+    return PreparedMap(pair, mesh, maps, turns, engine, notes)

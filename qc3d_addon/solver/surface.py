@@ -15,6 +15,7 @@ import numpy as np
 
 from .rotations import rotation_matrices, rotation_vectors
 from .stiffness import scatter
+from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, Ints
 
 # Triangles thinner than this part of the mean area have no usable directions in floating point.
@@ -29,23 +30,24 @@ class TriangleDeformation:
     ----------
     faces : (m, 3) int64
         Triangles that have an area in both keys.
-    areas : (m,)
-        Their areas in the first key.
+    weights : (m,)
+        What each counts in a fit: between one each and its area, so that small triangles keep their lengths too.
+        The sum is the area of the surface in the first key.
     bases : (m, 3, 3)
         Columns: two tangents and the unit normal in the first key.
     gradients : (m, 3, 2)
         Gradients of the hat functions in the tangent basis of the first key.
-    stretch : (m, 2, 2)
-        Symmetric in-plane stretch from the first key to the second.
+    stretch : Stretch
+        Symmetric in-plane stretch (m, 2, 2) from the first key to the second.
     turns : (m, 3)
         Rotation vectors in radians, the short way round.
     """
 
     faces: Ints
-    areas: Floats
+    weights: Floats
     bases: Floats
     gradients: Floats
-    stretch: Floats
+    stretch: Stretch
     turns: Floats
 
     @classmethod
@@ -61,12 +63,14 @@ class TriangleDeformation:
         stretch = spin.transpose(0, 2, 1) @ planar
         stretch = 0.5 * (stretch + stretch.transpose(0, 2, 1))
         rotations = _lifted(bases1, spin) @ bases0.transpose(0, 2, 1)
-        return cls(faces, 0.5 * double0[usable], bases0, gradients, stretch, rotation_vectors(rotations))
+        areas = 0.5 * double0[usable]
+        weights = np.sqrt(areas)
+        weights *= areas.sum() / max(float(weights.sum()), 1e-300)
+        return cls(faces, weights, bases0, gradients, Stretch.of(stretch), rotation_vectors(rotations))
 
-    def target_gradients(self, time: float) -> Floats:
+    def target_gradients(self, time: float, law: StretchLaw) -> Floats:
         """(m, 3, 2) hat gradients times the stretch at ``time``: what a rotation turns into target gradients."""
-        stretch = (1.0 - time) * np.eye(2) + time * self.stretch
-        return np.asarray(self.gradients @ stretch)
+        return np.asarray(self.gradients @ self.stretch.at(time, law))
 
     def interpolated_rotations(self, turns: Floats, time: float) -> Floats:
         """(m, 3, 2) tangent parts of exp(time q) B0 for the rotation vectors q (m, 3)."""
@@ -82,7 +86,7 @@ class TriangleDeformation:
 
     def load(self, rotations: Floats, targets: Floats, count: int) -> Floats:
         """(n, 3) right-hand side of the least-squares fit for rotated target gradients."""
-        forces = self.areas[:, None, None] * (targets @ rotations.transpose(0, 2, 1))
+        forces = self.weights[:, None, None] * (targets @ rotations.transpose(0, 2, 1))
         return scatter(self.faces, forces, count)
 
 

@@ -4,76 +4,86 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from .anchors import ScrewAnchors
 from .branches import consistent_branches
-from .embedding import Embedding, RigidMotion
-from .stiffness import StiffnessPattern, scatter
-from .surface import TriangleDeformation, face_normals
+from .embedding import Embedding
+from .enclosed import ClosedComponents
+from .stiffness import StiffnessPattern, scatter, stiffness_elements
+from .stretch import StretchLaw
+from .surface import TriangleDeformation
 from .tetmesh import Floats, Ints
-from .topology import closed_faces, face_adjacency, sides, unique_edges, vertex_components, welded
+from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
-SWEEPS = 10
-_VOLUME_STEPS = 2
+SWEEPS = 20
+# Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
+_OVER_RELAXATION = 1.7
 
 
 class SurfacePath:
-    """Shapes between the two keys of an embedded pair, by the surface alone; everything constant is factored once.
+    """Shapes between the two keys of an embedded pair; everything that does not depend on the time is factored once.
 
-    Positions minimise, over the triangles with area a, rotation R_t and stretch P_t,
-    ``sum a |grad x - R_t P_t|^2 + w sum m |x - anchor_t|^2``, with the rotations refitted in sweeps. Edges that
-    belong to no usable triangle keep their interpolated lengths. Still vertices are held. The enclosed volume of
-    every closed component is that between its key volumes.
+    Positions minimise ``sum w |grad x - R_t P_t|^2 + a sum m |x - anchor_t|^2`` over triangles with weight w, rotation
+    R_t and stretch P_t, and vertices with area m; rotations are refitted to positions in sweeps. Edges that belong to
+    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys. The enclosed volume of every closed
+    component is that between its key volumes.
 
     Parameters
     ----------
     embedding : Embedding
-    anchor_weight : float
-        The weight w, for a surface of area 1 and a bounding-box diagonal of 1.
-    sweeps : int
-        How often the rotations are refitted to the positions.
+    law : StretchLaw
+        How stretches are interpolated.
     """
 
-    def __init__(self, embedding: Embedding, anchor_weight: float = ANCHOR_WEIGHT, sweeps: int = SWEEPS) -> None:
-        self._sweeps = sweeps
-        representatives, self._group = welded(embedding.key0, embedding.key1)
-        self._key0, self._key1 = embedding.key0[representatives], embedding.key1[representatives]
-        self._still = embedding.still[representatives]
-        count = len(representatives)
+    def __init__(self, embedding: Embedding, law: StretchLaw = "linear") -> None:
+        self._law: StretchLaw = law
+        self._representatives, self._group = welded(embedding.key0, embedding.key1)
+        self._key0, key1 = embedding.key0[self._representatives], embedding.key1[self._representatives]
+        self._travel = key1 - self._key0
+        self._free = ~embedding.still[self._representatives]
+        count = len(self._representatives)
         faces = self._group[embedding.pair.faces]
-        self.deformation = TriangleDeformation.between(self._key0, self._key1, faces)
+        self.deformation = TriangleDeformation.between(self._key0, key1, faces)
         self.turns = consistent_branches(self.deformation.turns, face_adjacency(self.deformation.faces))
-        self._edges = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
-        self._lengths = [
-            np.linalg.norm(key[self._edges[:, 1]] - key[self._edges[:, 0]], axis=1) for key in (self._key0, self._key1)
-        ]
-        links = np.concatenate([unique_edges(sides(faces)), self._edges])
-        labels = vertex_components(links, count)
-        self._closed = faces[closed_faces(faces, labels)]
-        self._closed_labels = labels
-        self._volumes = [self._enclosed(key) for key in (self._key0, self._key1)]
+        self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
+        self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
+        labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
+        self._closed = ClosedComponents(faces, labels)
+        self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = np.bincount(self._group, weights=embedding.weights, minlength=count)
-        self._anchor = _Anchor(self._key0, self._key1, self._still, weights, labels)
-        self._factor(anchor_weight, weights)
-
-    def _factor(self, anchor_weight: float, weights: Floats) -> None:
-        deformation, count = self.deformation, len(self._key0)
-        elements = deformation.areas[:, None, None] * (
-            deformation.gradients @ deformation.gradients.transpose(0, 2, 1)
-        )
+        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
-        area = float(deformation.areas.sum()) or size**2
-        self._mass = anchor_weight * area / size**2 * weights
-        matrix = StiffnessPattern(deformation.faces, count).assemble(elements)
-        springs = StiffnessPattern(self._edges, count).assemble(
-            np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(self._edges), 2, 2))
+        area = float(self.deformation.weights.sum()) or size**2
+        self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        self._factor()
+
+    def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
+        """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
+        stronger = copy.copy(self)
+        strongest = np.ones(len(self._key0))
+        np.maximum.at(strongest, self._group, factors)
+        stronger._anchor_weights = self._anchor_weights * strongest
+        stronger._factor()
+        return stronger
+
+    def _factor(self) -> None:
+        deformation, free = self.deformation, self._free
+        count = len(free)
+        spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(self._springs), 2, 2))
+        matrix = csc_array(
+            StiffnessPattern(deformation.faces, count).assemble(
+                stiffness_elements(deformation.weights, deformation.gradients)
+            )
+            + StiffnessPattern(self._springs, count).assemble(spring)
+            + diags_array(self._anchor_weights)
         )
-        matrix = csc_array(matrix + springs + diags_array(self._mass))
-        free = ~self._still
-        self._held_load = (matrix[:, self._still] @ self._key0[self._still])[free]
+        self._held_columns = matrix[free][:, ~free]
         # The matrix is symmetric positive definite, so the pivots may stay on the diagonal.
         self._factored = splu(
             csc_array(matrix[free][:, free]),
@@ -82,84 +92,55 @@ class SurfacePath:
             options={"SymmetricMode": True},
         )
 
-    def positions(self, time: float) -> Floats:
-        """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1."""
+    def positions(self, time: float, anchor: Floats | None = None) -> Floats:
+        """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.
+
+        ``anchor`` (n, 3) must be the key at 0 and 1 as well; without it each component is drawn along its screw.
+        """
         deformation = self.deformation
-        anchor = self._anchor.positions(time)
-        targets = deformation.target_gradients(time)
+        drawn_to = self._screws.positions(time) if anchor is None else anchor[self._representatives]
+        targets = deformation.target_gradients(time, self._law)
         rotations = deformation.interpolated_rotations(self.turns, time)
-        positions = self._solved(anchor, rotations, targets, anchor, time)
-        for _ in range(self._sweeps):
-            rotations = deformation.fitted_rotations(positions, targets)
-            positions = self._solved(anchor, rotations, targets, positions, time)
-        return positions[self._group]
+        positions = self._solved(drawn_to, rotations, targets, drawn_to, time)
+        for _ in range(SWEEPS - 1):
+            fitted = self._refitted(drawn_to, positions, targets, time)
+            positions = positions + _OVER_RELAXATION * (fitted - positions)
+        positions = self._refitted(drawn_to, positions, targets, time)
+        return self._with_volume(positions, time)[self._group]
+
+    def _refitted(self, anchor: Floats, positions: Floats, targets: Floats, time: float) -> Floats:
+        rotations = self.deformation.fitted_rotations(positions, targets)
+        return self._solved(anchor, rotations, targets, positions, time)
 
     def _solved(self, anchor: Floats, rotations: Floats, targets: Floats, previous: Floats, time: float) -> Floats:
-        free = ~self._still
-        load = self.deformation.load(rotations, targets, len(anchor)) + self._mass[:, None] * anchor
+        load = self.deformation.load(rotations, targets, len(anchor)) + self._anchor_weights[:, None] * anchor
         load += self._spring_load(previous, time)
-        positions = self._key0.copy()
-        positions[free] = self._factored.solve(load[free] - self._held_load)
+        positions = self._key0 + time * self._travel
+        load = load[self._free] - self._held_columns @ positions[~self._free]
+        positions[self._free] = self._factored.solve(load)
         return self._with_volume(positions, time)
 
     def _spring_load(self, positions: Floats, time: float) -> Floats:
         """(n, 3) forces of edges without triangles: their present direction at the interpolated length."""
-        spans = positions[self._edges[:, 1]] - positions[self._edges[:, 0]]
+        spans = _spans(positions, self._springs)
         present = np.linalg.norm(spans, axis=1)
         wanted = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
         spans *= np.where(present > 1e-12, wanted / np.maximum(present, 1e-12), 0.0)[:, None]
-        return scatter(self._edges, np.stack([-spans, spans], axis=1), len(positions))
+        return scatter(self._springs, np.stack([-spans, spans], axis=1), len(positions))
 
     def _with_volume(self, positions: Floats, time: float) -> Floats:
-        """Newton steps along K^-1 grad V until every closed component has its interpolated volume."""
-        if not len(self._closed):
+        """One Newton step along K^-1 grad V towards the interpolated volume of every closed component."""
+        if self._closed.empty:
             return positions
-        wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
-        free = ~self._still
-        for _ in range(_VOLUME_STEPS):
-            normals = face_normals(positions, self._closed) / 6.0
-            slope = scatter(self._closed, np.repeat(normals[:, None], 3, axis=1), len(positions))
-            direction = np.zeros_like(positions)
-            direction[free] = self._factored.solve(slope[free])
-            gain = np.bincount(self._closed_labels, weights=(slope * direction).sum(axis=1))
-            missing = wanted - self._enclosed(positions)
-            step = np.where(gain > 0.0, missing / np.where(gain > 0.0, gain, 1.0), 0.0)
-            positions = positions + step[self._closed_labels][:, None] * direction
-        return positions
-
-    def _enclosed(self, positions: Floats) -> Floats:
-        """Enclosed volume per connected component, zero for components that are not closed."""
-        first, second, third = (positions[self._closed[:, corner]] for corner in range(3))
-        shares = np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0
-        labels = self._closed_labels
-        return np.bincount(labels[self._closed[:, 0]], weights=shares, minlength=int(labels.max()) + 1)
+        slope = self._closed.volume_gradient(positions)
+        direction = np.zeros_like(positions)
+        direction[self._free] = self._factored.solve(slope[self._free])
+        missing = (1.0 - time) * self._volumes[0] + time * self._volumes[1] - self._closed.volumes(positions)
+        return self._closed.stepped(positions, direction, slope, missing)
 
 
-class _Anchor:
-    """Where vertices are drawn to: each component along the screw motion between its keys, the rest straight.
-
-    A component with still vertices has no screw motion of its own.
-    """
-
-    def __init__(self, key0: Floats, key1: Floats, still: np.ndarray, weights: Floats, labels: Ints) -> None:
-        self._key0 = key0
-        self._parts: list[tuple[Ints, RigidMotion]] = []
-        order = np.argsort(labels, kind="stable")
-        starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
-        for members in np.split(order, starts[1:]):
-            if len(members) >= 3 and not still[members].any():
-                self._parts.append((members, RigidMotion.between(key0[members], key1[members], weights[members])))
-        self._missing = key1 - self._moved(1.0)
-
-    def _moved(self, time: float) -> Floats:
-        moved = self._key0.copy()
-        for members, motion in self._parts:
-            moved[members] = motion.apply(self._key0[members], time)
-        return moved
-
-    def positions(self, time: float) -> Floats:
-        """(n, 3) anchors at ``time``; exactly the keys at 0 and 1 up to rounding."""
-        return self._moved(time) + time * self._missing
+def _spans(positions: Floats, edges: Ints) -> Floats:
+    return np.asarray(positions[edges[:, 1]] - positions[edges[:, 0]])
 
 
 def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
@@ -168,4 +149,4 @@ def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
     held = unique_edges(sides(usable))
     span = int(every.max(initial=0)) + 1
     covered = np.isin(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
-    return every[~covered]
+    return np.asarray(every[~covered])

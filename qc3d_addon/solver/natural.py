@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mode ``natural``: the surface by its own rotations and stretches, carried by a map of the cube without folds."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from .crossings import crossing_pairs
+from .frame import Frame
+from .prepared import PreparedMap
+from .stretch import StretchLaw
+from .surface_path import SurfacePath
+from .tetmesh import Bools, Floats
+from .topology import sides
+from .volume_path import VolumePath
+from .winding import winding_numbers
+
+_REPAIR_ITERATIONS = 15
+_UNCROSSING_ROUNDS = 3
+# Around a crossing the anchors of the volume win; their influence fades over so many rings of neighbours.
+_STRONGEST_ANCHOR = 1e5
+_FADING_RINGS = 4
+
+
+class NaturalFrames:
+    """In-betweens of a prepared pair; both keys are met, what both leave in place stays, no map has folds.
+
+    Parameters
+    ----------
+    prepared : PreparedMap
+    law : StretchLaw
+        How stretches are interpolated.
+    """
+
+    def __init__(self, prepared: PreparedMap, law: StretchLaw = "linear") -> None:
+        self._prepared = prepared
+        self.notes: tuple[str, ...] = ()
+        embedding, mesh = prepared.embedding, prepared.mesh
+        inside = winding_numbers(embedding.key0, prepared.pair.faces, mesh.centroids)
+        self._volume = VolumePath(mesh, prepared.mapped, prepared.turns, inside, law)
+        self._surface = SurfacePath(embedding, law)
+        self._missed = [
+            key - prepared.landmarks @ self._volume.at(time)
+            for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
+        ]
+
+    def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
+        volumes, positions = [], []
+        for index, time in enumerate(times.tolist()):
+            yield 0.9 * index / len(times)
+            volumes.append(self._volume.at(time))
+            positions.append(self._surface.positions(time, self._anchor(volumes[-1], time)))
+        yield from self._uncrossed(times, volumes, positions)
+        made = []
+        for time, values, shape in zip(times.tolist(), volumes, positions, strict=True):
+            folded = self._prepared.folds(values) > 0
+            unfolded = self._unfolded(values, time) if folded else values
+            made.append(Frame.of(self._prepared, self._in_place(shape, time), unfolded, time, folded))
+        return made
+
+    def _in_place(self, shape: Floats, time: float) -> Floats:
+        """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
+        pair, still = self._prepared.pair, self._prepared.embedding.still
+        positions = self._prepared.embedding.from_cube(shape, time)
+        positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
+        return positions
+
+    def _anchor(self, values: Floats, time: float) -> Floats:
+        """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
+        return np.asarray(
+            self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1]
+        )
+
+    def _unfolded(self, values: Floats, time: float) -> Floats:
+        """A map without folds with nearly the same landmarks, from the nearest one on the way to the second key."""
+        maps = self._prepared.maps
+        nearest = maps[round(time * (len(maps) - 1))]
+        return self._prepared.fitter.fit(nearest, self._prepared.landmarks @ values, _REPAIR_ITERATIONS)
+
+    def _uncrossed(
+        self, times: Floats, volumes: list[Floats], positions: list[Floats]
+    ) -> Generator[float, None, None]:
+        """Where a frame crosses itself more than the keys do, let the volume's anchors win, and solve all again."""
+        pair, embedding = self._prepared.pair, self._prepared.embedding
+        count = len(pair.faces)
+        in_keys = [_pair_codes(crossing_pairs(key, pair.faces), count) for key in (embedding.key0, embedding.key1)]
+        allowed = max(len(codes) for codes in in_keys)
+        factors = np.ones(len(pair.key0))
+        for round_ in range(_UNCROSSING_ROUNDS):
+            yield 0.9 + 0.1 * round_ / _UNCROSSING_ROUNDS
+            new = np.zeros(len(pair.key0), dtype=bool)
+            for shape in positions:
+                crossing = crossing_pairs(shape, pair.faces)
+                if len(crossing) > allowed:
+                    fresh = ~np.isin(_pair_codes(crossing, count), np.concatenate(in_keys))
+                    new[pair.faces[crossing[fresh]].ravel()] = True
+            if not new.any():
+                return
+            factors = np.maximum(factors, self._faded(new))
+            surface = self._surface.with_stronger_anchors(factors)
+            for index, time in enumerate(times.tolist()):
+                positions[index] = surface.positions(time, self._anchor(volumes[index], time))
+
+    def _faded(self, chosen: Bools) -> Floats:
+        """(n,) factors from the strongest at the chosen vertices to 1 a few rings away."""
+        edges = sides(self._prepared.pair.faces)
+        count = len(chosen)
+        ring: csr_array = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
+        reach = chosen.astype(np.float64)
+        level = reach.copy()
+        for _ in range(_FADING_RINGS):
+            reach = np.minimum(reach + ring @ reach + ring.T @ reach, 1.0)
+            level += reach
+        return np.asarray(_STRONGEST_ANCHOR ** (level / (_FADING_RINGS + 1)))
+
+
+def _pair_codes(pairs: np.ndarray, count: int) -> np.ndarray:
+    return np.asarray(pairs[:, 0] * count + pairs[:, 1])

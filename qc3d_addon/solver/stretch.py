@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stretches between the identity and a given symmetric matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .tetmesh import Floats
+
+StretchLaw = Literal["linear", "logarithmic"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Symmetric positive definite matrices by their eigenvalues (m, d) and eigenvectors (m, d, d)."""
+
+    values: Floats
+    vectors: Floats
+
+    @classmethod
+    def of(cls, matrices: Floats) -> Stretch:
+        """Decompose (m, d, d) symmetric positive definite matrices."""
+        values, vectors = np.linalg.eigh(matrices)
+        return cls(values, vectors)
+
+    def at(self, time: float, law: StretchLaw) -> Floats:
+        """(m, d, d) stretches at ``time``: (1 - t) I + t P, or exp(t log P); positive definite for t in 0..1."""
+        values = (1.0 - time) + time * self.values if law == "linear" else self.values**time
+        return np.asarray((self.vectors * values[:, None, :]) @ self.vectors.transpose(0, 2, 1))

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map of the cube on its way from the identity to the fitted map, rotation kept."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from .representation import polar_decomposition
+from .rotations import rotation_matrices
+from .stiffness import StiffnessPattern, scatter, stiffness_elements
+from .stretch import Stretch, StretchLaw
+from .tetmesh import Floats, TetMesh
+
+OUTSIDE_WEIGHT = 1e-3
+
+
+class VolumePath:
+    """Maps between the identity and a fitted map by interpolated rotations and stretches.
+
+    Values minimise ``sum v w |grad f - R_t P_t|^2`` over the tetrahedra with the sliding boundary of the cube, where
+    R_t = exp(t q). The matrix does not depend on the time and is factored once per coordinate.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    mapped : (N, 3)
+        The fitted map, without folds.
+    turns : (M, 3)
+        Rotation vectors q of the tetrahedra in the branch that the motion takes, radians.
+    inside : (M,)
+        Winding numbers, 1 inside the object and 0 outside; what is between is weighted in between.
+    law : StretchLaw
+    """
+
+    def __init__(self, mesh: TetMesh, mapped: Floats, turns: Floats, inside: Floats, law: StretchLaw) -> None:
+        self._mesh = mesh
+        self._turns = turns
+        self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(mapped)).stretch)
+        self._law = law
+        weights = mesh.volumes * np.clip(np.abs(inside), OUTSIDE_WEIGHT, 1.0)
+        self._weighted_gradients = weights[:, None, None] * mesh.gradients
+        matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(stiffness_elements(weights, mesh.gradients))
+        self._held = mesh.on_cube_face
+        self._systems = []
+        for coordinate in range(3):
+            free = ~self._held[:, coordinate]
+            rows = matrix[free]
+            factored = splu(
+                csc_array(rows[:, free]),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+            held_load = rows[:, ~free] @ mesh.points[~free, coordinate]
+            self._systems.append((free, factored, held_load))
+
+    def at(self, time: float) -> Floats:
+        """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
+        wanted = rotation_matrices(time * self._turns) @ self._stretch.at(time, self._law)
+        load = scatter(self._mesh.tets, self._weighted_gradients @ wanted.transpose(0, 2, 1), len(self._mesh.points))
+        values = self._mesh.points.copy()
+        for coordinate, (free, factored, held_load) in enumerate(self._systems):
+            values[free, coordinate] = factored.solve(load[free, coordinate] - held_load)
+        return values

@@ -53,8 +53,10 @@ def _candidates(low: Floats, high: Floats) -> list[tuple[Ints, Ints]]:
     owner = np.repeat(np.arange(len(low)), counts)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
     span = spans[owner]
-    place = np.stack([within // (span[:, 1] * span[:, 2]), within // span[:, 2] % span[:, 1], within % span[:, 2]], axis=1)
-    place += first_cell[owner]
+    place = first_cell[owner]
+    place[:, 0] += within // (span[:, 1] * span[:, 2])
+    place[:, 1] += within // span[:, 2] % span[:, 1]
+    place[:, 2] += within % span[:, 2]
     size = last_cell.max(axis=0) + 1
     code = (place[:, 0] * size[1] + place[:, 1]) * size[2] + place[:, 2]
     order = np.lexsort((owner, code))

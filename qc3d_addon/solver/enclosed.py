@@ -51,4 +51,4 @@ class ClosedComponents:
 
     def _summed(self, vertices: Ints, values: Floats) -> Floats:
         components = int(self._labels.max(initial=-1)) + 1
-        return np.bincount(self._labels[vertices], weights=values, minlength=components)
+        return np.bincount(self._labels[vertices], weights=values, minlength=components).astype(np.float64)

@@ -14,7 +14,7 @@ from .frame import Frame
 from .prepared import PreparedMap
 from .stretch import StretchLaw
 from .surface_path import SurfacePath
-from .tetmesh import Bools, Floats
+from .tetmesh import Bools, Floats, Ints
 from .topology import sides
 from .volume_path import VolumePath
 from .winding import winding_numbers
@@ -119,5 +119,5 @@ class NaturalFrames:
         return np.asarray(_STRONGEST_ANCHOR ** (level / (_FADING_RINGS + 1)))
 
 
-def _pair_codes(pairs: np.ndarray, count: int) -> np.ndarray:
+def _pair_codes(pairs: Ints, count: int) -> Ints:
     return np.asarray(pairs[:, 0] * count + pairs[:, 1])

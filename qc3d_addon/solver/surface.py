@@ -93,7 +93,7 @@ class TriangleDeformation:
 def face_normals(positions: Floats, faces: Ints) -> Floats:
     """(m, 3) normals of the triangles, twice as long as the areas."""
     first, second, third = (positions[faces[:, corner]] for corner in range(3))
-    return np.cross(second - first, third - first)
+    return np.asarray(np.cross(second - first, third - first))
 
 
 def tangent_bases(positions: Floats, faces: Ints) -> Floats:
@@ -117,7 +117,7 @@ def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
 def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: Floats) -> Floats:
     """(m, 2, 2) in-plane Jacobians from the tangent basis of ``gradients`` to that of ``bases``."""
     corners = np.einsum("mki,mij->mkj", positions[faces], bases[:, :, :2])
-    return np.einsum("mki,mkj->mij", corners, gradients)
+    return np.asarray(np.einsum("mki,mkj->mij", corners, gradients))
 
 
 def _planar_rotations(planar: Floats) -> Floats:

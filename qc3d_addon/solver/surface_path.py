@@ -31,8 +31,8 @@ class SurfacePath:
 
     Positions minimise ``sum w |grad x - R_t P_t|^2 + a sum m |x - anchor_t|^2`` over triangles with weight w, rotation
     R_t and stretch P_t, and vertices with area m; rotations are refitted to positions in sweeps. Edges that belong to
-    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys. The enclosed volume of every closed
-    component is that between its key volumes.
+    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys.
+    The enclosed volume of every closed component is that between its key volumes.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class SurfacePath:
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
-        weights = np.bincount(self._group, weights=embedding.weights, minlength=count)
+        weights: Floats = np.bincount(self._group, weights=embedding.weights, minlength=count).astype(np.float64)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
         area = float(self.deformation.weights.sum()) or size**2

@@ -43,7 +43,7 @@ class TetMesh:
     @cached_property
     def volumes(self) -> Floats:
         """(M,): signed volumes, cube units."""
-        return np.linalg.det(self.edge_matrices) / 6.0
+        return np.asarray(np.linalg.det(self.edge_matrices) / 6.0)
 
     @cached_property
     def gradients(self) -> Floats:
@@ -54,7 +54,7 @@ class TetMesh:
     @cached_property
     def centroids(self) -> Floats:
         """(M, 3): centroids of the tetrahedra."""
-        return self.points[self.tets].mean(axis=1)
+        return np.asarray(self.points[self.tets].mean(axis=1))
 
     @cached_property
     def neighbours(self) -> Ints:
@@ -80,12 +80,12 @@ class TetMesh:
     def boundary_faces(self) -> Ints:
         """(F, 3): triangles on the boundary, normals pointing out."""
         tet, corner = np.nonzero(self.neighbours < 0)
-        return self.tets[tet[:, None], OPPOSITE_FACES[corner]]
+        return np.asarray(self.tets[tet[:, None], OPPOSITE_FACES[corner]])
 
     @cached_property
     def on_cube_face(self) -> Bools:
         """(N, 3): whether coordinate c of a vertex is exactly 0 or 1, that is, held by the sliding boundary."""
-        return (self.points == 0.0) | (self.points == 1.0)
+        return np.asarray((self.points == 0.0) | (self.points == 1.0))
 
     def jacobians(self, values: Floats) -> Floats:
         """(M, 3, 3) Jacobians of the piecewise linear map that sends ``points`` to ``values`` (N, 3)."""

@@ -34,7 +34,7 @@ SWEEPS = 40  # of the search for the samples' places in the second key
 
 
 def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> tuple[Floats, dict[str, int]]:
-    """In-betweens (k, n, 3) at the times, and the counts of tetrahedra, folded ones in the second key, loose vertices."""
+    """In-betweens (k, n, 3), and how many tetrahedra, folded ones in the second key and loose vertices there are."""
     motion = RigidMotion.between(key0, key1)
     target = motion.undo(key1)
     points, tetrahedra = interior.fill(key0, faces)

@@ -28,7 +28,8 @@ def fill(positions: Floats, faces: Ints) -> tuple[Floats, Ints]:
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
     backward = volumes < 0.0
     tetrahedra[backward] = tetrahedra[backward][:, [0, 2, 1, 3]]
-    longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a in range(4) for b in range(a)], axis=0)
+    pairs = [(a, b) for a in range(4) for b in range(a)]
+    longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs], axis=0)
     solid = np.abs(volumes) > 1e-4 * longest**3  # what is flatter is a sliver between points of one plane or sphere
     tetrahedra, corners = tetrahedra[solid], corners[solid]
     winding = winding_numbers(corners.mean(axis=1), positions, faces)

@@ -59,8 +59,13 @@ def vertex_components(edges: Ints, count: int) -> Ints:
 
 
 def closed_faces(faces: Ints, labels: Ints) -> Bools:
-    """(m,) triangles of components in which every edge has exactly two triangles; ``labels`` are per vertex."""
-    edges, uses = np.unique(sides(faces), axis=0, return_counts=True)
+    """(m,) triangles of components that enclose a volume; ``labels`` are per vertex.
+
+    Every edge has exactly two triangles there, whose normals agree: where they do not, the signed volume means nothing.
+    """
+    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges, index, uses = np.unique(sides(faces), axis=0, return_inverse=True, return_counts=True)
+    forward = np.bincount(index.ravel(), weights=directed[:, 0] < directed[:, 1], minlength=len(edges))
     is_open = np.zeros(int(labels.max(initial=-1)) + 1, dtype=bool)
-    is_open[labels[edges[uses != 2, 0]]] = True
+    is_open[labels[edges[(uses != 2) | (forward != 1), 0]]] = True
     return np.asarray(~is_open[labels[faces[:, 0]]])

@@ -51,11 +51,14 @@ class LinearFrames:
     def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
         made = []
+        pair, still = self._prepared.pair, self._prepared.embedding.still
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             values = self._maps.at(time)
             positions = self._prepared.embedding.from_cube(
                 self._prepared.landmarks @ values + time * self._missed, time
             )
+            # A part that both keys leave in place must not breathe with the map around it.
+            positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
             made.append(Frame.of(self._prepared, positions, values, time, repaired=False))
         return made

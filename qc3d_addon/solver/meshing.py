@@ -51,7 +51,7 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
     Parameters
     ----------
     points : (n, 3) float64
-        Vertices inside [0.1, 0.9]³.
+        Vertices inside [0.14, 0.86]³.
     faces : (m, 3) int64
         Triangles: open, non-manifold, crossing, degenerate or none at all.
     settings : Settings

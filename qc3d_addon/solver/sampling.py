@@ -126,7 +126,7 @@ def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
     (n, 3) float64
         All samples; those on the cube's faces have coordinates that are exactly 0 or 1.
     """
-    samples = np.concatenate([_corners(), surface])
+    samples: Floats = np.concatenate([_corners(), surface])
     for dimension in (1, 2, 3):
         candidates = _candidates(dimension, size, rng)
         radii = size(candidates)

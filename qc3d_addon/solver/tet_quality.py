@@ -22,7 +22,8 @@ def smallest_dihedral_angles(mesh: TetMesh) -> Floats:
     """(M,) smallest of the six dihedral angles of each tetrahedron, in degrees; 70.5 for the regular one."""
     corners = mesh.points[mesh.tets[:, OPPOSITE_FACES]]
     normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
-    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    # A face without area keeps its zero normal; the flat tetrahedron shows in the angle between its other faces.
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), np.finfo(np.float64).tiny)
     # The angle between two faces is the supplement of that between their outward normals.
     cosines = -np.einsum("mia,mja->mij", normals, normals)
     first, second = np.triu_indices(4, 1)

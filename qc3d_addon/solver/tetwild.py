@@ -12,6 +12,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import zipfile
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .tet_quality import triangulate
 from .tetmesh import Floats, Ints, TetMesh
 
-MARGIN = 0.1  # the surface keeps this far from the cube's faces
+MARGIN = 0.14  # the surface keeps this far from the cube's faces; also the longest edge that fTetWild aims at
 CHILD = Path(__file__).resolve().parent.parent / "worker" / "tetwild_child.py"
 
 _EDGE_FACTOR = 1.6  # fTetWild's ideal edges per distance between Poisson-disk samples, for equally fine meshes
@@ -43,7 +44,7 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
     Parameters
     ----------
     points : (n, 3) float64
-        Vertices inside [0.1, 0.9]³.
+        Vertices inside [0.14, 0.86]³.
     faces : (m, 3) int64
         Triangles, in any state.
     resolution : Resolution
@@ -64,6 +65,7 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
     coarse = RESOLUTIONS["draft"]
     surface = sample_surface(points, faces, coarse.spacing, rng)
     samples = sample_cube(surface, coarse.around(surface), rng)
+    background = TetMesh(samples, triangulate(samples))
     # fTetWild works in the bounding box of all its vertices, grown by the edge length on every side. With the two
     # vertices that no triangle uses this box is the unit cube, exactly.
     inner = np.array([[MARGIN] * 3, [1.0 - MARGIN] * 3])
@@ -74,7 +76,7 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
         "edge_length": np.array(MARGIN),
         "epsilon": np.array(0.7 * resolution.spacing / diagonal),
         "size_points": samples,
-        "size_tets": triangulate(samples),
+        "size_tets": background.tets[background.volumes > 1e-10],  # fTetWild interpolates in them
         "size_values": _EDGE_FACTOR * resolution.around(surface)(samples),
     }
     positions, tets = run_child(arrays, time_limit)
@@ -140,8 +142,11 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
         if status != 0 or not output.exists():
             how = f" with an error: {message}." if message else f" without a mesh (exit status {status})."
             raise MeshingError(f"The meshing engine tetwild ended{how}")
-        with np.load(output, allow_pickle=False) as archive:
-            return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
+        try:
+            with np.load(output, allow_pickle=False) as archive:
+                return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
+        except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
+            raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
 
 
 def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:

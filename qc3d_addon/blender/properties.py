@@ -14,6 +14,7 @@ from . import names
 from .bake import BakeRequest
 
 _DESCRIPTIONS = {
+    "natural": "Rotations, lengths and volumes are kept",
     "linear": "The stretch of the volume is interpolated linearly, as published",
     "auto": "TetWild where it can run, else Delaunay",
     "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",

@@ -109,6 +109,8 @@ class Record:
         """Keep a map in place of an older one of the same pair; ``write`` must follow."""
         self.maps = [other for other in self.maps if (other.from_key, other.to_key) != (kept.from_key, kept.to_key)]
         self.maps.append(kept)
+        # Blender cuts bytes at their first zero where they overwrite bytes; a new property keeps them whole.
+        keys.pop(kept.property_name, None)
         keys[kept.property_name] = data
 
 

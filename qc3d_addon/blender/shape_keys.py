@@ -158,7 +158,7 @@ def write_chain(
     chain.keys = {step: written[step].name for step in sorted(written)}
     active = None if active in stale else active
     for key in stale:
-        obj.shape_key_remove(key)
+        _remove_key(obj, key)
     _activate(obj, active)
     keys.update_tag()
     return notes
@@ -166,10 +166,17 @@ def write_chain(
 
 def _new_key(obj: bpy.types.Object, name: str, undo: ExitStack) -> bpy.types.ShapeKey:
     key = obj.shape_key_add(name=name, from_mix=False)
-    undo.callback(obj.shape_key_remove, key)
+    undo.callback(_remove_key, obj, key)
     key.value = 0.0  # Blender 5 starts with 1
     key.relative_key = obj.data.shape_keys.reference_key
     return key
+
+
+def _remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
+    # Removing a key together with its driver leaves the driver in the dependency graph, and Blender crashes at the
+    # next update; removing the driver first has the graph rebuilt.
+    slider.undrive(key)
+    obj.shape_key_remove(key)
 
 
 def _activate(obj: bpy.types.Object, key: bpy.types.ShapeKey | None) -> None:

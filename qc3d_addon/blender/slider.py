@@ -57,6 +57,13 @@ def drive(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str, step: int, 
     curve.driver.expression = expression(step, intervals)
 
 
+def undrive(key: bpy.types.ShapeKey) -> None:
+    """Remove the driver of a shape key's value, if it has one."""
+    keys, path = key.id_data, value_path(key.name)
+    if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
+        keys.driver_remove(path)
+
+
 def retarget(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str) -> None:
     """Let the driver of a key read the slider of ``obj``; the object that it read before may have been deleted."""
     driven_by(key.id_data, name)[value_path(key.name)].variables[0].targets[0].id = obj

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map of a pair is made once and kept with the keys: in the file, until a key, the mesh or the settings change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, get_args
+
+import bpy
+import pytest
+
+from qc3d_addon.solver.settings import Mode
+
+PAIR = {"from_key": "Basis", "to_key": "Lean"}
+
+
+def bake(**choices: object) -> None:
+    assert bpy.ops.qc3d.bake_inbetweens(**{**PAIR, "count": 1, "mode": 'linear', **choices}) == {'FINISHED'}
+
+
+def map_properties() -> dict[str, bytes]:
+    keys = bpy.data.objects["Figure"].data.shape_keys
+    return {name: data for name, data in keys.items() if name.startswith("qc3d_map")}
+
+
+def reload(folder: Path) -> None:
+    path = str(folder / "kept.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+
+
+def test_a_real_map_survives_saving_and_loading(
+    figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from qc3d_addon.solver import pipeline
+
+    real = {"quality": 'draft', "engine": 'delaunay'}
+    assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}
+    kept = map_properties()
+    reload(tmp_path)
+    assert map_properties() == kept
+    monkeypatch.setattr(pipeline, "prepare", None)  # a call would raise
+    bake(**real)
+    assert map_properties() == kept
+
+
+def test_bakes_after_it_skip_meshing_and_fitting(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    bpy.ops.qc3d.prepare(**PAIR)
+    assert len(quick_map) == 1
+    assert [key.name for key in figure.data.shape_keys.key_blocks] == ["Basis", "Lean", "Stretch"]
+    bake()
+    bake(count=5)
+    assert len(quick_map) == 1
+
+
+def test_a_bake_keeps_its_map_for_the_next(figure: bpy.types.Object, quick_map: list[Any], tmp_path: Path) -> None:
+    bake()
+    reload(tmp_path)
+    bake(count=2)
+    assert len(quick_map) == 1
+
+
+@pytest.mark.parametrize("name", ["Basis", "Lean"])
+def test_a_sculpted_key_asks_for_a_new_map(figure: bpy.types.Object, quick_map: list[Any], name: str) -> None:
+    bake()
+    figure.data.shape_keys.key_blocks[name].points[3].co.z += 1e-3
+    bake()
+    assert len(quick_map) == 2
+    assert len(map_properties()) == 1
+
+
+def test_other_settings_ask_for_a_new_map(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    fine = {"quality": 'fine', "engine": 'delaunay'}
+    for choices in ({}, {"quality": 'fine'}, fine, fine):
+        bake(**choices)
+    assert len(quick_map) == 3
+
+
+def test_the_same_map_serves_every_mode(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    for mode in get_args(Mode):
+        bake(mode=mode)
+    assert len(quick_map) == 1
+
+
+def test_each_pair_has_its_own_and_a_deleted_keys_map_goes(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    bake()
+    bake(to_key="Stretch")
+    bake()
+    assert len(quick_map) == 2
+    assert len(map_properties()) == 2
+    figure.shape_key_remove(figure.data.shape_keys.key_blocks["Stretch"])
+    bake()
+    assert len(map_properties()) == 1
+
+
+def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    bpy.ops.qc3d.prepare(**PAIR)
+    bpy.ops.qc3d.prepare(**PAIR)
+    assert len(quick_map) == 2
+
+
+def test_a_damaged_map_is_refused_and_prepare_heals_it(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    bake()
+    (name,) = map_properties()
+    figure.data.shape_keys[name] = map_properties()[name][:100]
+    with pytest.raises(RuntimeError, match="The stored map is damaged; prepare the keys again"):
+        bake(count=2)
+    bpy.ops.qc3d.prepare(**PAIR)
+    bake(count=2)

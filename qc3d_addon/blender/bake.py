@@ -236,7 +236,7 @@ def _kept_map(pair: KeyPair, request: BakeRequest) -> KeptMap:
     from ..solver.storage import fingerprint
 
     settings = request.settings  # the mode is not part of it: one map serves every mode
-    made_from = f"{fingerprint(pair)} {settings.engine} {settings.quality} {settings.seed}"
+    made_from = f"{fingerprint(pair)} {settings.preparation}"
     return KeptMap(request.from_key, request.to_key, made_from)
 
 

@@ -8,18 +8,51 @@ carried from element to element along a spanning tree that crosses the smallest 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-from .rotations import nearest_branch
-from .tetmesh import Floats, Ints
+from .rotations import nearest_branch, rotation_matrices, rotation_vectors
+from .tetmesh import Bools, Floats, Ints
+
+_MOST_SWING = 1.1 * np.pi
 
 
-def consistent_branches(turns: Floats, adjacency: Ints) -> Floats:
-    """Rotation vectors (m, 3) with full turns added so that neighbours agree.
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """How elements turn with time: R_t = exp(t swing) exp(t twist).
+
+    The twist is about one axis for a whole part of the surface and of any number of turns; the swing is what is left.
+    A part that turns less has no twist, its swing is the whole rotation.
+
+    Parameters
+    ----------
+    swing, twist : (m, 3)
+        Rotation vectors, radians.
+    """
+
+    swing: Floats
+    twist: Floats
+
+    def at(self, time: float) -> Floats:
+        """(m, 3, 3) rotations at ``time`` in 0..1."""
+        rotations = rotation_matrices(time * self.swing)
+        if self.twist.any():
+            rotations = rotations @ rotation_matrices(time * self.twist)
+        return rotations
+
+    @property
+    def angles(self) -> Floats:
+        """(m,) how far each element turns, radians."""
+        return np.asarray(np.maximum(np.linalg.norm(self.swing, axis=1), np.linalg.norm(self.twist, axis=1)))
+
+
+def consistent_turning(turns: Floats, adjacency: Ints, weights: Floats, held: Bools, extra_turns: int) -> Turning:
+    """Turn every element so that neighbours agree, beyond 180 degrees and beyond 360 where they do.
 
     Parameters
     ----------
@@ -27,44 +60,86 @@ def consistent_branches(turns: Floats, adjacency: Ints) -> Floats:
         Rotation vectors, angles in [0, pi].
     adjacency : (k, 2) int64
         Pairs of neighbouring elements.
+    weights : (m,)
+        What elements count in the axis of their part.
+    held : (m,) bool
+        Elements that touch what both keys leave in place.
+    extra_turns : int
+        Full turns to add to parts that nothing holds.
 
-    Returns
-    -------
-    (m, 3) rotation vectors of the same rotations. In each connected part the element that turns least keeps its
-    angle.
+    Notes
+    -----
+    The rotation vector of an element is followed to its neighbours by the nearest branch, which is right up to a full
+    turn: there the axis is lost. A part that turns by more than ``_MOST_SWING`` is therefore split into a twist about
+    its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
     """
     count = len(turns)
     if not count:
-        return turns.copy()
-    first, second = adjacency.T
-    # A relative rotation of zero must still count as an edge of the graph.
-    cost = _relative_angles(turns[first], turns[second]) + 1e-9
-    graph = coo_array((cost, (first, second)), shape=(count, count)).tocsr()
-    tree = minimum_spanning_tree(graph)
-    parts, labels = connected_components(tree, directed=False)
-    angles = np.linalg.norm(turns, axis=1)
-    by_angle = np.lexsort((angles, labels))
-    roots = by_angle[np.searchsorted(labels[by_angle], np.arange(parts))]
-    return _carried_from(roots, tree, turns)
+        return Turning(turns.copy(), turns.copy())
+    forest = _Forest(turns, adjacency)
+    vectors = forest.carried(turns, nearest_branch)
+    axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
+    half = 0.5 * np.linalg.norm(turns, axis=1)
+    sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
+    phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
+    loose = ~np.isin(forest.labels, forest.labels[held])
+    phases[loose] += 2.0 * np.pi * extra_turns
+    furthest = np.zeros(forest.labels.max() + 1)
+    np.maximum.at(furthest, forest.labels, np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)))
+    twists = (furthest > _MOST_SWING)[forest.labels]
+    twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
+    return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
 
 
-def _carried_from(roots: Ints, tree: csr_array, turns: Floats) -> Floats:
-    """Walk the spanning forest outwards from the roots, a whole generation at a time."""
-    count = len(turns)
-    # One more node joins all roots, so that one search covers every part.
-    rows, columns = tree.nonzero()
-    rows = np.concatenate([rows, np.full(len(roots), count)])
-    columns = np.concatenate([columns, roots])
-    joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
-    order, parents = (found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False))
-    depth = _depths(order, parents)
-    result = turns.copy()
-    by_depth = order[np.argsort(depth[order], kind="stable")]
-    starts = np.searchsorted(depth[by_depth], np.arange(2, depth.max() + 2))
-    for begin, end in pairwise(starts):
-        members = by_depth[begin:end]
-        result[members] = nearest_branch(turns[members], result[parents[members]])
-    return result
+def swing_beside(turns: Floats, twist: Floats) -> Floats:
+    """(m, 3) rotation vectors of what rotations (m, 3) are beside a twist (m, 3), the short way round."""
+    return rotation_vectors(rotation_matrices(turns) @ rotation_matrices(-twist))
+
+
+def _nearest_phase(phases: Floats, references: Floats) -> Floats:
+    return np.asarray(phases + 2.0 * np.pi * np.round((references - phases) / (2.0 * np.pi)))
+
+
+def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
+    """(parts, 3) unit axes about which the parts turn most."""
+    products = weights[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
+    summed = np.zeros((labels.max() + 1, 3, 3))
+    np.add.at(summed, labels, products)
+    return np.asarray(np.linalg.eigh(summed)[1][:, :, 2])
+
+
+class _Forest:
+    """A spanning tree of each connected part, over the smallest relative rotations, rooted where it turns least."""
+
+    def __init__(self, turns: Floats, adjacency: Ints) -> None:
+        count = len(turns)
+        first, second = adjacency.T
+        # A relative rotation of zero must still count as an edge of the graph.
+        cost = _relative_angles(turns[first], turns[second]) + 1e-9
+        tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
+        parts, labels = connected_components(tree, directed=False)
+        self.labels: Ints = np.asarray(labels, dtype=np.int64)
+        by_angle = np.lexsort((np.linalg.norm(turns, axis=1), labels))
+        roots = by_angle[np.searchsorted(labels[by_angle], np.arange(parts))]
+        # One more node joins all roots, so that one search covers every part.
+        rows, columns = tree.nonzero()
+        rows = np.concatenate([rows, np.full(len(roots), count)])
+        columns = np.concatenate([columns, roots])
+        joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
+        order, self._parents = (
+            found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False)
+        )
+        depth = _depths(order, self._parents)
+        self._by_depth = order[np.argsort(depth[order], kind="stable")]
+        self._starts = np.searchsorted(depth[self._by_depth], np.arange(2, depth.max() + 2))
+
+    def carried(self, values: Floats, align: Callable[[Floats, Floats], Floats]) -> Floats:
+        """Walk outwards from the roots, a generation at a time, aligning each value with its parent's."""
+        result = values.copy()
+        for begin, end in pairwise(self._starts):
+            members = self._by_depth[begin:end]
+            result[members] = align(values[members], result[self._parents[members]])
+        return result
 
 
 def _depths(order: Ints, parents: Ints) -> Ints:

@@ -55,7 +55,7 @@ def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Gene
         The part that is done, 0..1.
     """
     mesh = fitter.mesh
-    angles = np.degrees(np.linalg.norm(path.turns, axis=1))
+    angles = np.degrees(path.turning.angles)
     steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
     maps = np.empty((steps + 1, *mesh.points.shape))
     maps[0] = mesh.points

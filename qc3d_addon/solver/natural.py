@@ -8,7 +8,9 @@ from collections.abc import Generator
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
+from scipy.spatial import cKDTree
 
+from .branches import Turning, swing_beside
 from .crossings import crossing_pairs
 from .frame import Frame
 from .prepared import PreparedMap
@@ -41,8 +43,9 @@ class NaturalFrames:
         self.notes: tuple[str, ...] = ()
         embedding, mesh = prepared.embedding, prepared.mesh
         inside = winding_numbers(embedding.key0, prepared.pair.faces, mesh.centroids)
-        self._volume = VolumePath(mesh, prepared.mapped, prepared.turns, inside, law)
-        self._surface = SurfacePath(embedding, law)
+        self._surface = SurfacePath(embedding, law, prepared.extra_turns)
+        turning = _turning_inside(prepared, self._surface)
+        self._volume = VolumePath(mesh, prepared.mapped, turning, inside, law)
         self._missed = [
             key - prepared.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
@@ -65,7 +68,7 @@ class NaturalFrames:
 
     def _in_place(self, shape: Floats, time: float) -> Floats:
         """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
-        pair, still = self._prepared.pair, self._prepared.embedding.still
+        pair, still = self._prepared.pair, self._surface.still
         positions = self._prepared.embedding.from_cube(shape, time)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
@@ -117,6 +120,18 @@ class NaturalFrames:
             reach = np.minimum(reach + ring @ reach + ring.T @ reach, 1.0)
             level += reach
         return np.asarray(_STRONGEST_ANCHOR ** (level / (_FADING_RINGS + 1)))
+
+
+def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:
+    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with the nearest triangle's twist."""
+    triangles, twist = surface.deformation.faces, surface.turning.twist
+    if not twist.any():
+        return Turning(prepared.turns, np.zeros_like(prepared.turns))
+    centres = prepared.embedding.key0[surface.vertices[triangles]].mean(axis=1)
+    nearest = cKDTree(centres).query(prepared.mesh.centroids)[1]
+    twists = twist[nearest].any(axis=1)
+    swing = np.where(twists[:, None], swing_beside(prepared.turns, twist[nearest]), prepared.turns)
+    return Turning(swing, twist[nearest])
 
 
 def _pair_codes(pairs: Ints, count: int) -> Ints:

@@ -107,10 +107,19 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     yield Progress("locate", 1.0)
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        path = SurfacePath(embedding, settings.stretch)
+        path = SurfacePath(embedding, settings.stretch, settings.extra_turns)
         followed = yield from _staged("fit", follow_path(fitter, path, embedding.key1))
     yield Progress("fit", 1.0)
-    return PreparedMap(pair, filled.mesh, followed.maps, followed.turns, filled.engine, filled.notes, seconds)
+    return PreparedMap(
+        pair,
+        filled.mesh,
+        followed.maps,
+        followed.turns,
+        settings.extra_turns,
+        filled.engine,
+        filled.notes,
+        seconds,
+    )
 
 
 def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> Steps[Bake]:

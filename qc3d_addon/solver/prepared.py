@@ -32,6 +32,8 @@ class PreparedMap:
         identity first, the map fitted to the second key last.
     turns : (M, 3)
         Rotation vectors of the tetrahedra of the last map, radians, in the branch that the motion takes.
+    extra_turns : int
+        The setting that the way was found with.
     engine : str
         The engine that made the mesh.
     notes : tuple of str
@@ -44,6 +46,7 @@ class PreparedMap:
     mesh: TetMesh
     maps: Floats
     turns: Floats
+    extra_turns: int
     engine: str
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)

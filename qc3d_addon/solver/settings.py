@@ -25,6 +25,9 @@ class Settings:
         How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme.
     stretch
         How ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
+    extra_turns
+        Full turns, -100..100, that two shapes cannot tell: added to components without still vertices; where
+        something is still, any number but 0 lets what is back in its place after whole turns turn with the rest.
     engine
         What fills the cube: ``tetwild``, ``delaunay``, or ``auto`` (tetwild where it can run).
     quality
@@ -37,6 +40,7 @@ class Settings:
 
     mode: Mode = "natural"
     stretch: StretchLaw = "linear"
+    extra_turns: int = 0
     engine: Engine = "auto"
     quality: Quality = "normal"
     seed: int = 0
@@ -47,5 +51,12 @@ class Settings:
             value, choices = getattr(self, name), get_args(kind)
             if value not in choices:
                 raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
+        if not -100 <= self.extra_turns <= 100:
+            raise InputError(f"{self.extra_turns} extra turns are asked for; choose a number from -100 to 100.")
         if not self.mesh_time_limit > 0.0:
             raise InputError(f"The time limit of meshing is {self.mesh_time_limit} s; it must be positive.")
+
+    @property
+    def preparation(self) -> str:
+        """The choices that a prepared map depends on; a map prepared with others must be made anew."""
+        return f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"

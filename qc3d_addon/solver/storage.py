@@ -35,6 +35,7 @@ def to_bytes(prepared: PreparedMap) -> bytes:
     header = {
         "version": FORMAT_VERSION,
         "fingerprint": fingerprint(prepared.pair),
+        "extra_turns": prepared.extra_turns,
         "engine": prepared.engine,
         "notes": list(prepared.notes),
     }
@@ -62,6 +63,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             header = json.loads(bytes(stored["header"]))
             version, owner = header["version"], header["fingerprint"]
+            extra_turns = int(header["extra_turns"])
             engine, notes = str(header["engine"]), tuple(str(note) for note in header["notes"])
             points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
             tets = np.asarray(stored["tets"], dtype=np.int64)
@@ -83,4 +85,4 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
     # Written so that a volume that is not a number counts as damage too.
     if not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps) or not mesh.volumes.min() > 0.0:
         raise InputError(_DAMAGED)
-    return PreparedMap(pair, mesh, maps, turns, engine, notes)
+    return PreparedMap(pair, mesh, maps, turns, extra_turns, engine, notes)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .rotations import rotation_matrices, rotation_vectors
+from .branches import Turning
+from .rotations import rotation_vectors
 from .stiffness import scatter
 from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, Ints
@@ -72,9 +73,9 @@ class TriangleDeformation:
         """(m, 3, 2) hat gradients times the stretch at ``time``: what a rotation turns into target gradients."""
         return np.asarray(self.gradients @ self.stretch.at(time, law))
 
-    def interpolated_rotations(self, turns: Floats, time: float) -> Floats:
-        """(m, 3, 2) tangent parts of exp(time q) B0 for the rotation vectors q (m, 3)."""
-        return np.asarray(rotation_matrices(time * turns) @ self.bases[:, :, :2])
+    def interpolated_rotations(self, turning: Turning, time: float) -> Floats:
+        """(m, 3, 2) tangents of the first key turned until ``time``."""
+        return np.asarray(turning.at(time) @ self.bases[:, :, :2])
 
     def fitted_rotations(self, positions: Floats, targets: Floats) -> Floats:
         """(m, 3, 2) tangent parts of the rotations that bring the target gradients closest to ``positions`` (n, 3)."""

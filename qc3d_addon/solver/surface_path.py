@@ -11,7 +11,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from .anchors import ScrewAnchors
-from .branches import consistent_branches
+from .branches import consistent_turning
 from .embedding import Embedding
 from .enclosed import ClosedComponents
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
@@ -24,6 +24,7 @@ ANCHOR_WEIGHT = 0.05
 SWEEPS = 20
 # Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
 _OVER_RELAXATION = 1.7
+_LARGEST_VOLUME_STEP = 0.1
 
 
 class SurfacePath:
@@ -39,18 +40,38 @@ class SurfacePath:
     embedding : Embedding
     law : StretchLaw
         How stretches are interpolated.
+    extra_turns : int
+        Full turns to add to every component without still vertices. In a component with still vertices any number
+        but 0 says that what comes back to its place after whole turns is not still, so that it turns with the rest.
+
+    Attributes
+    ----------
+    vertices : (k,) int64
+        One of each group of vertices that coincide in both keys; ``deformation`` counts in these.
+    still : (n,) bool
+        Vertices that stay on the straight line between the keys.
+    turning : Turning
+        How the triangles of ``deformation`` turn.
     """
 
-    def __init__(self, embedding: Embedding, law: StretchLaw = "linear") -> None:
+    def __init__(self, embedding: Embedding, law: StretchLaw = "linear", extra_turns: int = 0) -> None:
         self._law: StretchLaw = law
-        self._representatives, self._group = welded(embedding.key0, embedding.key1)
-        self._key0, key1 = embedding.key0[self._representatives], embedding.key1[self._representatives]
+        self.vertices, self._group = welded(embedding.key0, embedding.key1)
+        self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._travel = key1 - self._key0
-        self._free = ~embedding.still[self._representatives]
-        count = len(self._representatives)
+        still = embedding.still[self.vertices]
+        count = len(self.vertices)
         faces = self._group[embedding.pair.faces]
         self.deformation = TriangleDeformation.between(self._key0, key1, faces)
-        self.turns = consistent_branches(self.deformation.turns, face_adjacency(self.deformation.faces))
+        usable = self.deformation
+        held = still[usable.faces].any(axis=1)
+        self.turning = consistent_turning(
+            usable.turns, face_adjacency(usable.faces), usable.weights, held, extra_turns
+        )
+        if extra_turns:
+            still[usable.faces[self.turning.angles > np.pi]] = False
+        self.still = still[self._group]
+        self._free = ~still
         self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
@@ -98,9 +119,9 @@ class SurfacePath:
         ``anchor`` (n, 3) must be the key at 0 and 1 as well; without it each component is drawn along its screw.
         """
         deformation = self.deformation
-        drawn_to = self._screws.positions(time) if anchor is None else anchor[self._representatives]
+        drawn_to = self._screws.positions(time) if anchor is None else anchor[self.vertices]
         targets = deformation.target_gradients(time, self._law)
-        rotations = deformation.interpolated_rotations(self.turns, time)
+        rotations = deformation.interpolated_rotations(self.turning, time)
         positions = self._solved(drawn_to, rotations, targets, drawn_to, time)
         for _ in range(SWEEPS - 1):
             fitted = self._refitted(drawn_to, positions, targets, time)
@@ -135,7 +156,10 @@ class SurfacePath:
         slope = self._closed.volume_gradient(positions)
         direction = np.zeros_like(positions)
         direction[self._free] = self._factored.solve(slope[self._free])
-        missing = (1.0 - time) * self._volumes[0] + time * self._volumes[1] - self._closed.volumes(positions)
+        wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
+        # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
+        most = _LARGEST_VOLUME_STEP * np.abs(wanted)
+        missing = np.clip(wanted - self._closed.volumes(positions), -most, most)
         return self._closed.stepped(positions, direction, slope, missing)
 
 

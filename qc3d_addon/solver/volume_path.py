@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from .branches import Turning
 from .representation import polar_decomposition
-from .rotations import rotation_matrices
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
 from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, TetMesh
@@ -20,24 +20,24 @@ OUTSIDE_WEIGHT = 1e-3
 class VolumePath:
     """Maps between the identity and a fitted map by interpolated rotations and stretches.
 
-    Values minimise ``sum v w |grad f - R_t P_t|^2`` over the tetrahedra with the sliding boundary of the cube, where
-    R_t = exp(t q). The matrix does not depend on the time and is factored once per coordinate.
+    Values minimise ``sum v w |grad f - R_t P_t|^2`` over the tetrahedra with the sliding boundary of the cube, with R_t
+    from ``turning``. The matrix does not depend on the time and is factored once per coordinate.
 
     Parameters
     ----------
     mesh : TetMesh
     mapped : (N, 3)
         The fitted map, without folds.
-    turns : (M, 3)
-        Rotation vectors q of the tetrahedra in the branch that the motion takes, radians.
+    turning : Turning
+        How the tetrahedra turn.
     inside : (M,)
         Winding numbers, 1 inside the object and 0 outside; what is between is weighted in between.
     law : StretchLaw
     """
 
-    def __init__(self, mesh: TetMesh, mapped: Floats, turns: Floats, inside: Floats, law: StretchLaw) -> None:
+    def __init__(self, mesh: TetMesh, mapped: Floats, turning: Turning, inside: Floats, law: StretchLaw) -> None:
         self._mesh = mesh
-        self._turns = turns
+        self._turning = turning
         self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(mapped)).stretch)
         self._law = law
         weights = mesh.volumes * np.clip(np.abs(inside), OUTSIDE_WEIGHT, 1.0)
@@ -59,7 +59,7 @@ class VolumePath:
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
-        wanted = rotation_matrices(time * self._turns) @ self._stretch.at(time, self._law)
+        wanted = self._turning.at(time) @ self._stretch.at(time, self._law)
         load = scatter(self._mesh.tets, self._weighted_gradients @ wanted.transpose(0, 2, 1), len(self._mesh.points))
         values = self._mesh.points.copy()
         for coordinate, (free, factored, held_load) in enumerate(self._systems):

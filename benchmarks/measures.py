@@ -92,14 +92,14 @@ def excess(values: Floats, first: Floats, second: Floats, floor: float) -> Float
     low, high = np.minimum(first, second), np.maximum(first, second)
     below = (low - values) / np.maximum(low, floor)
     above = (values - high) / np.maximum(high, floor)
-    return np.maximum(np.maximum(below, above), 0.0)
+    return np.asarray(np.maximum(np.maximum(below, above), 0.0))
 
 
 def count_crossings(positions: Floats, faces: Ints) -> int | None:
     """Number of crossing pairs of triangles that share no vertex; None where Blender's module is missing."""
     try:
         import bpy  # noqa: F401  (mathutils comes with it)
-        from mathutils.bvhtree import BVHTree
+        from mathutils.bvhtree import BVHTree  # type: ignore[import-not-found,unused-ignore]
     except ImportError:
         return None
     tree = BVHTree.FromPolygons(positions.tolist(), faces.tolist(), all_triangles=True, epsilon=0.0)
@@ -157,8 +157,7 @@ class Judge:
         rows = [self.frame(shape, float(time)) for time, shape in zip(moments, shapes, strict=True)]
         inner = [row for row in rows if 0.0 < row["t"] < 1.0] or rows
         worst = {
-            name: None if any(row[name] is None for row in inner) else max(row[name] for row in inner)
-            for name in WORST
+            name: None if any(row[name] is None for row in inner) else max(row[name] for row in inner) for name in WORST
         }
         misses = [np.abs(shapes[0] - self.key0).max(), np.abs(shapes[-1] - self.key1).max()]
         return {

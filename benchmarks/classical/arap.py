@@ -75,4 +75,4 @@ def place_samples(system: LeastSquares, points: Floats, surface: Floats) -> Floa
     for _ in range(SWEEPS):
         rotations = rotations_nearest(system.gradients(final))
         final[held:] = inner.solve(system.divergence(rotations)[held:] - coupling @ surface)
-    return final
+    return np.asarray(final)

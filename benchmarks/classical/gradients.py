@@ -27,7 +27,7 @@ def rotations_nearest(matrices: Floats) -> Floats:
     """The proper rotation (m, 3, 3) nearest to each matrix; a reflection goes into the smallest singular value."""
     left, _, right = np.linalg.svd(matrices)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return left @ right
+    return np.asarray(left @ right)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class LeastSquares:
 
     def gradients(self, positions: Floats) -> Floats:
         """Gradients (m, 3, 3) of a shape (count, 3)."""
-        return np.einsum("mai,maj->mij", positions[self.elements], self.hat_gradients)
+        return np.asarray(np.einsum("mai,maj->mij", positions[self.elements], self.hat_gradients))
 
     @cached_property
     def _free(self) -> Ints:
@@ -138,11 +138,9 @@ class LeastSquares:
         sizes = np.bincount(self.components)[:, None]
         missing = centres_like - solution
         shift = np.stack([np.bincount(self.components, missing[:, i]) for i in range(3)], axis=1) / sizes
-        return solution + shift[self.components]
+        return np.asarray(solution + shift[self.components])
 
 
 def factorised(matrix: csc_array) -> SuperLU:
     """Factor a symmetric positive definite matrix."""
-    return splu(
-        csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    return splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

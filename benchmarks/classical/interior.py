@@ -69,7 +69,7 @@ def winding_numbers(queries: Floats, positions: Floats, faces: Ints, cells: int 
     centres = corners.mean(axis=1)
     normals = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     grid = np.floor((centres - centres.min(axis=0)) / (np.ptp(centres, axis=0).max() / cells)).astype(np.int64)
-    cell = np.unique(grid, axis=0, return_inverse=True)[1].ravel()
+    cell = np.unique(np.minimum(grid, cells - 1), axis=0, return_inverse=True)[1].ravel()
     sizes = np.bincount(cell)
     starts = np.cumsum(sizes) - sizes
     members = np.argsort(cell, kind="stable")

@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measure in-betweens: QC3D beside the straight blend and two classical methods.
+
+    python benchmarks/inbetweens.py                                   # every pair, every method, resumed
+    python benchmarks/inbetweens.py --pairs body:rest:t_pose bar:straight:bend180 --methods straight natural
+    python benchmarks/inbetweens.py --listed --check                  # exit status 1 where `natural` falls short
+    python benchmarks/inbetweens.py --write                           # the tables and sheets of docs/inbetweens.md
+
+The list of pairs and the shapes are found by QC3D_PAIRS and QC3D_DATA. Results are kept in a folder, one for each pair
+and method, and made again when the sources that they depend on have changed.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")  # before numpy loads: the processes share the cores
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+    from benchmarks.runner import main
+
+    sys.exit(main(description=__doc__))

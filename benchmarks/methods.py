@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ways to make in-betweens that are compared."""
+
+from __future__ import annotations
+
+import time as clock
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qc3d_addon.solver import pipeline
+from qc3d_addon.solver.keypair import KeyPair
+from qc3d_addon.solver.prepared import PreparedMap
+from qc3d_addon.solver.settings import Settings
+
+from .classical import arap, poisson
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+OURS = ("linear", "natural")
+METHODS = ("straight", "poisson", "arap", *OURS)
+
+
+class Outcome(NamedTuple):
+    """In-betweens (k, n, 3), the seconds they took, and what the method says about itself."""
+
+    frames: Floats
+    seconds: float
+    details: dict[str, Any]
+
+
+class Contest:
+    """Runs methods on one pair of shapes; the map that both modes of QC3D start from is fitted once."""
+
+    def __init__(self, faces: Ints, key0: Floats, key1: Floats, times: Floats, engine: str, quality: str) -> None:
+        self.faces, self.key0, self.key1, self.times = faces, key0, key1, times
+        self._choices: dict[str, Any] = {"engine": engine, "quality": quality}
+        self._prepared: PreparedMap | None = None
+
+    def run(self, method: str) -> Outcome:
+        """The in-betweens of one method."""
+        started = clock.perf_counter()
+        if method in OURS:
+            return self._ours(method)
+        details: dict[str, Any] = {}
+        if method == "straight":
+            weight = self.times[:, None, None]
+            frames = (1.0 - weight) * self.key0 + weight * self.key1
+        elif method == "poisson":
+            frames = poisson.frames(self.key0, self.key1, self.faces, self.times)
+        elif method == "arap":
+            frames, counts = arap.frames(self.key0, self.key1, self.faces, self.times)
+            details.update(counts)
+        else:
+            raise ValueError(f"Unknown method {method!r}; there are {', '.join(METHODS)}.")
+        return Outcome(frames, clock.perf_counter() - started, details)
+
+    def _ours(self, mode: str) -> Outcome:
+        settings = Settings(mode=mode, **self._choices)  # type: ignore[arg-type]
+        if self._prepared is None:
+            pair = KeyPair.checked(self.key0, self.key1, self.faces)
+            self._prepared = pipeline.finish(pipeline.prepare(pair, settings))
+        bake = pipeline.finish(pipeline.inbetweens(self._prepared, self.times, settings))
+        return Outcome(bake.frames, sum(bake.report["seconds"].values()), {"report": bake.report})

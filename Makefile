@@ -17,13 +17,17 @@ BIN := $(VENV)/bin
 
 .PHONY: demo test lint assets clean
 
+KEYS := --object Arm --from Basis --to "Bend and twist"
+
 demo: $(VENV)/installed
 	rm -rf demo && mkdir demo
-	$(BIN)/qc3d bake assets/limb.blend --object Arm --from Basis --to "Bend and twist" --frames 5 \
-	    --mode linear --output demo/limb.blend --report demo/limb.json
-	$(BIN)/python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --straight \
-	    --object Arm --from Basis --to "Bend and twist" --output demo/limb.png
-	@echo "Look at demo/limb.png, open demo/limb.blend in Blender, read demo/limb.json."
+	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 \
+	    --output demo/limb.blend --report demo/limb.json
+	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 --mode linear \
+	    --output demo/limb_linear.blend --report demo/limb_linear.json
+	$(BIN)/python tools/contact_sheet.py "mode linear=demo/limb_linear.blend" "mode natural=demo/limb.blend" --straight \
+	    $(KEYS) --output demo/limb.png
+	@echo "Look at demo/limb.png, open demo/limb.blend in Blender and press play, read demo/limb.json."
 
 test: $(VENV)/installed lint
 	$(BIN)/python -m pytest

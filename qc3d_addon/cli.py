@@ -19,6 +19,7 @@ from .solver.array_files import read_pair, replacing, write_frames
 from .solver.errors import InputError, QC3DError
 from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
 from .solver.settings import Engine, Mode, Quality, Settings
+from .solver.stretch import StretchLaw
 
 MOST_FRAMES = 10_000
 
@@ -87,7 +88,8 @@ def _print_notes(notes: Iterable[str]) -> None:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    return Settings(mode=arguments.mode, engine=arguments.engine, quality=arguments.quality, seed=arguments.seed)
+    names = ("mode", "stretch", "extra_turns", "engine", "quality", "seed")
+    return Settings(**{name: getattr(arguments, name) for name in names})
 
 
 def _require_distinct_files(*paths: Path | None) -> None:
@@ -136,12 +138,20 @@ def _add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents
 
 def _add_settings(command: argparse.ArgumentParser) -> None:
     for name, choices, text in (
-        ("mode", get_args(Mode), "how the map is interpolated"),
+        ("mode", get_args(Mode), "how in-betweens are made"),
+        ("stretch", get_args(StretchLaw), "how mode natural interpolates stretches"),
         ("engine", get_args(Engine), "what fills the volume around the mesh"),
         ("quality", get_args(Quality), "how fine the volume is"),
     ):
         default = getattr(_DEFAULTS, name)
         command.add_argument(f"--{name}", choices=choices, default=default, help=f"{text} (default: {default})")
+    command.add_argument(
+        "--extra-turns",
+        type=_whole_number,
+        default=_DEFAULTS.extra_turns,
+        metavar="TURNS",
+        help="full turns that two shapes cannot tell (default: 0)",
+    )
     command.add_argument(
         "--seed", type=_seed, default=_DEFAULTS.seed, metavar="S", help="of the delaunay engine's samples (default: 0)"
     )

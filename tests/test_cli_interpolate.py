@@ -16,6 +16,8 @@ import pytest
 
 from qc3d_addon import cli
 from qc3d_addon.solver import array_files
+from qc3d_addon.solver.keypair import KeyPair
+from qc3d_addon.solver.settings import Settings
 
 QUICK = ["--quality", "draft", "--engine", "delaunay"]
 
@@ -65,10 +67,25 @@ def test_frames_run_from_key_to_key(bar_file: Path, bar: dict[str, np.ndarray], 
     assert found["peak_memory_mb"] > 10
 
 
+def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Reached(Exception):
+        pass
+
+    def prepare(pair: KeyPair, settings: Settings) -> None:
+        expected = Settings("linear", "logarithmic", -2, engine="delaunay", quality="draft", seed=5)
+        assert settings == expected
+        raise Reached
+
+    monkeypatch.setattr(cli, "prepare", prepare)
+    options = ["--mode", "linear", "--stretch", "logarithmic", "--extra-turns", "-2", "--seed", "5"]
+    with pytest.raises(Reached):
+        interpolate(bar_file, tmp_path / "frames.npz", *options)
+
+
 def test_the_same_seed_gives_the_same_frames(bar_file: Path, tmp_path: Path) -> None:
     outputs = [tmp_path / "one.npz", tmp_path / "two.npz"]
     for output in outputs:
-        assert interpolate(bar_file, output, "--seed", "7") == 0
+        assert interpolate(bar_file, output, "--seed", "7", "--mode", "linear") == 0
     one, two = (np.load(output)["frames"] for output in outputs)
     np.testing.assert_array_equal(one, two)
 
@@ -91,6 +108,9 @@ def test_real_keys(data_folder: Path, tmp_path: Path) -> None:
         (["--mode", "magic"], "'magic'"),
         (["--engine", "steam"], "'steam'"),
         (["--quality", "best"], "'best'"),
+        (["--stretch", "rubber"], "'rubber'"),
+        (["--extra-turns", "1000"], "1000 extra turns are asked for"),
+        (["--extra-turns", "half"], "'half' is not a whole number"),
         (["--seed", "-3"], "-3 is negative"),
         (["--speed", "9"], "--speed"),
         (["--output", "missing/frames.npz"], "frames.npz cannot be written: No such file or directory"),

@@ -10,4 +10,7 @@ def run_command(arguments: list[str]) -> int:
     # Imported when the command runs: Blender registers it each time it starts.
     from ..cli import main
 
-    return main(arguments)
+    try:
+        return main(arguments)
+    except SystemExit as ended:  # --help and --version end this way, which Blender would report as an error
+        return int(ended.code or 0)

@@ -10,8 +10,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..solver.settings import Engine, Mode, Quality, Settings
-from . import names
 from .bake import BakeRequest
+from .names import MAX_INBETWEENS
 
 _DESCRIPTIONS = {
     "natural": "Rotations, lengths and volumes are kept",
@@ -59,7 +59,7 @@ class BakeChoices(PairChoices):
         description="Number of in-betweens, evenly spaced from the first key to the second",
         default=3,
         min=1,
-        max=names.MAX_INBETWEENS,
+        max=MAX_INBETWEENS,
         soft_max=20,
         options={'SKIP_SAVE'},
     )
@@ -83,11 +83,6 @@ class BakeChoices(PairChoices):
         name="End", description="Frame at which the slider is at the second key", default=25, options={'SKIP_SAVE'}
     )
 
-    @classmethod
-    def names(cls) -> list[str]:
-        """Names of all choices."""
-        return [*PairChoices.__annotations__, *BakeChoices.__annotations__]
-
     def request(self) -> BakeRequest:
         """The choices as a request; raises InputError where they do not fit together."""
         return BakeRequest(
@@ -105,6 +100,7 @@ class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
 
 def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSettings) -> None:
     """Give every property that the caller of an operator left out the value that the panel shows."""
-    for name in set(properties.bl_rna.properties.keys()) & set(BakeChoices.names()):
+    shared = set(properties.bl_rna.properties.keys()) & set(settings.bl_rna.properties.keys())
+    for name in shared - {"rna_type"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))

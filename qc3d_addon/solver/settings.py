@@ -53,6 +53,8 @@ class Settings:
                 raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
         if not -100 <= self.extra_turns <= 100:
             raise InputError(f"{self.extra_turns} extra turns are asked for; choose a number from -100 to 100.")
+        if self.seed < 0:
+            raise InputError(f"The seed is {self.seed}; it must be 0 or more.")
         if not self.mesh_time_limit > 0.0:
             raise InputError(f"The time limit of meshing is {self.mesh_time_limit} s; it must be positive.")
 

@@ -20,8 +20,8 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("QC3D_DATA", ROOT / "../shared/data")).resolve()
 PAIRS = Path(os.environ.get("QC3D_PAIRS", ROOT / "../shared/bench/pairs.json")).resolve()
 
-# More turns than two shapes can tell: measured, but nothing is demanded.
-AMBIGUOUS = ("bar:straight:twist450", "bar:twist450:bend180")
+# Turns that two shapes cannot tell: a user asks for them by option, and so does the benchmark of ``natural``.
+EXTRA_TURNS = {"bar:straight:twist450": 1, "bar:twist450:bend180": -1}
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,11 @@ class Pair:
     def listed(self) -> bool:
         """Whether the pair has limits of its own."""
         return bool(self.ratios)
+
+    @property
+    def extra_turns(self) -> int:
+        """Full turns to ask for by option."""
+        return EXTRA_TURNS.get(str(self), 0)
 
     def load(self) -> tuple[Ints, Floats, Floats]:
         """Triangles, first shape, second shape."""

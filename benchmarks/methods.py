@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from qc3d_addon.solver import pipeline
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.prepared import PreparedMap
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import Mode, Settings
 
 from .classical import arap, poisson
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-OURS = ("linear", "natural")
+OURS: tuple[Mode, ...] = ("linear", "natural")
 METHODS = ("straight", "poisson", "arap", *OURS)
 
 
@@ -33,18 +33,22 @@ class Outcome(NamedTuple):
 
 
 class Contest:
-    """Runs methods on one pair of shapes; the map that both modes of QC3D start from is fitted once."""
+    """Runs methods on one pair of shapes; the map that both modes of QC3D start from is fitted once.
 
-    def __init__(self, faces: Ints, key0: Floats, key1: Floats, times: Floats, engine: str, quality: str) -> None:
+    ``choices`` are settings of QC3D, such as the engine and the quality.
+    """
+
+    def __init__(self, faces: Ints, key0: Floats, key1: Floats, times: Floats, choices: dict[str, Any]) -> None:
         self.faces, self.key0, self.key1, self.times = faces, key0, key1, times
-        self._choices: dict[str, Any] = {"engine": engine, "quality": quality}
+        self._choices = choices
         self._prepared: PreparedMap | None = None
 
     def run(self, method: str) -> Outcome:
         """The in-betweens of one method."""
         started = clock.perf_counter()
-        if method in OURS:
-            return self._ours(method)
+        for mode in OURS:
+            if method == mode:
+                return self._ours(mode)
         details: dict[str, Any] = {}
         if method == "straight":
             weight = self.times[:, None, None]
@@ -58,8 +62,8 @@ class Contest:
             raise ValueError(f"Unknown method {method!r}; there are {', '.join(METHODS)}.")
         return Outcome(frames, clock.perf_counter() - started, details)
 
-    def _ours(self, mode: str) -> Outcome:
-        settings = Settings(mode=mode, **self._choices)  # type: ignore[arg-type]
+    def _ours(self, mode: Mode) -> Outcome:
+        settings = Settings(**self._choices, mode=mode)
         if self._prepared is None:
             pair = KeyPair.checked(self.key0, self.key1, self.faces)
             self._prepared = pipeline.finish(pipeline.prepare(pair, settings))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .catalogue import AMBIGUOUS
+from .catalogue import EXTRA_TURNS
 from .methods import METHODS
 from .verdict import CLASSICAL, RIVALRY, Verdict
 
@@ -109,11 +109,13 @@ def document(verdicts: Sequence[Verdict]) -> str:
 
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Counts in one sentence each."""
-    ours = [v for v in verdicts if "natural" in v.figures and str(v.pair) not in AMBIGUOUS]
+    ours = [v for v in verdicts if "natural" in v.figures]
     revisions = sorted({verdict.figures["natural"]["revision"] for verdict in ours})
     lines = [
         f"- Measured at {', '.join(revisions)}.",
-        f"- Counts leave out what two shapes cannot tell: {', '.join(AMBIGUOUS)}.",
+        "- Extra turns asked for by option: "
+        + ", ".join(f"{turns:+d} on {pair}" for pair, turns in EXTRA_TURNS.items())
+        + ".",
         f"- `natural` keeps every limit on {sum(not v.misses() for v in ours)} of {len(ours)} pairs.",
     ]
     for measure, name in zip(RIVALRY, ("lengths", "volume"), strict=True):

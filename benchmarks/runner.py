@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import report, sheets
-from .catalogue import AMBIGUOUS, ROOT, Catalogue, Pair
+from .catalogue import ROOT, Catalogue, Pair
 from .exact import exact_shape
 from .measures import Judge
 from .methods import METHODS, Contest
@@ -27,7 +27,8 @@ def measure_pair(pair: Pair, methods: list[str], results: Results) -> str:
     faces, key0, key1 = pair.load()
     times = np.linspace(0.0, 1.0, results.inner_frames + 2)
     judge = Judge(faces, key0, key1)
-    contest = Contest(faces, key0, key1, times, results.engine, results.quality)
+    choices = {"engine": results.engine, "quality": results.quality, "extra_turns": pair.extra_turns}
+    contest = Contest(faces, key0, key1, times, choices)
     said = []
     for method in methods:
         try:
@@ -58,8 +59,6 @@ def shortfalls(verdicts: list[Verdict]) -> list[str]:
     """Where `natural` misses a limit, or is visibly worse than a classical method in lengths or volume."""
     found = []
     for verdict in verdicts:
-        if str(verdict.pair) in AMBIGUOUS:
-            continue
         if "natural" not in verdict.figures:
             found.append(f"{verdict.pair}: natural was not measured")
             continue
@@ -77,7 +76,13 @@ def arguments(argv: list[str] | None, description: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", nargs="+", metavar="FILE:FROM:TO", help="only these (default: every pair)")
     parser.add_argument("--listed", action="store_true", help="only the pairs that have limits")
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
+    parser.add_argument(
+        "--methods",
+        nargs="+",
+        choices=METHODS,
+        default=list(METHODS),
+        help="measure only these (tables hold whatever is stored)",
+    )
     parser.add_argument("--engine", default="auto", help="what fills the cube for linear and natural")
     parser.add_argument("--quality", default="normal", help="how fine, for linear and natural")
     parser.add_argument("--frames", type=int, default=3, help="in-betweens, evenly spaced (default: 3)")
@@ -110,7 +115,7 @@ def main(argv: list[str] | None = None, description: str = "") -> int:
         if (
             figures := {
                 method: result
-                for method in chosen.methods
+                for method in METHODS
                 if (result := results.load(pair, method, current=not chosen.stored)) is not None
             }
         )

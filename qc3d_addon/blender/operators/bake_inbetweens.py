@@ -19,7 +19,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, bpy.types.Operator):
 
     bl_idname = "qc3d.bake_inbetweens"
     bl_label = "Bake In-Betweens"
-    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -20,7 +20,7 @@ class QC3D_OT_prepare(PairChoices, bpy.types.Operator):
 
     bl_idname = "qc3d.prepare"
     bl_label = "Prepare"
-    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -38,9 +38,9 @@ class Turning:
     swing: Floats
     twist: Floats
 
-    def at(self, time: float) -> Floats:
-        """(m, 3, 3) rotations at ``time`` in 0..1."""
-        rotations = rotation_matrices(time * self.swing)
+    def at(self, time: float, change: Floats | float = 0.0) -> Floats:
+        """(m, 3, 3) rotations at ``time`` in 0..1; ``change`` (m, 3) is added to the swing's rotation vector."""
+        rotations = rotation_matrices(time * self.swing + change)
         if self.twist.any():
             rotations = rotations @ rotation_matrices(time * self.twist)
         return rotations
@@ -126,9 +126,7 @@ class _Forest:
         rows = np.concatenate([rows, np.full(len(roots), count)])
         columns = np.concatenate([columns, roots])
         joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
-        order, self._parents = (
-            found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False)
-        )
+        order, self._parents = (found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False))
         depth = _depths(order, self._parents)
         self._by_depth = order[np.argsort(depth[order], kind="stable")]
         self._starts = np.searchsorted(depth[self._by_depth], np.arange(2, depth.max() + 2))

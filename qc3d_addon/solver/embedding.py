@@ -54,6 +54,11 @@ class RigidMotion:
         shift = target_centre - rotation_matrices(turn[None])[0] @ source_centre
         return cls(turn, np.linalg.solve(_translation_factor(turn), shift))
 
+    @property
+    def rotation(self) -> Floats:
+        """(3, 3) the rotation of the whole motion."""
+        return np.asarray(rotation_matrices(self.turn[None])[0])
+
     def apply(self, points: Floats, time: float = 1.0) -> Floats:
         """Move points (n, 3) along the screw up to ``time`` (0 = not at all, 1 = all the way)."""
         turn = time * self.turn

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Generator
 
 import numpy as np
@@ -14,6 +15,7 @@ from .branches import Turning, swing_beside
 from .crossings import crossing_pairs
 from .frame import Frame
 from .prepared import PreparedMap
+from .rates import Rates, hermite
 from .stretch import StretchLaw
 from .surface_path import SurfacePath
 from .tetmesh import Bools, Floats, Ints
@@ -46,10 +48,64 @@ class NaturalFrames:
         self._surface = SurfacePath(embedding, law, prepared.extra_turns)
         turning = _turning_inside(prepared, self._surface)
         self._volume = VolumePath(mesh, prepared.mapped, turning, inside, law)
+        self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
             key - prepared.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
         ]
+
+    @property
+    def still(self) -> Bools:
+        """(n,) vertices that stay in place."""
+        return self._surface.still
+
+    @property
+    def rows(self) -> Ints:
+        """(m,) the mesh's triangles that have rates: those with an area in both keys."""
+        return self._surface.deformation.rows
+
+    @property
+    def resting(self) -> Bools:
+        """(m,) whether a corner of these triangles stays in place."""
+        return np.asarray(self.still[self._prepared.pair.faces[self.rows]].any(axis=1))
+
+    @property
+    def components(self) -> Ints:
+        """(n,) labels of the connected components, which the rates of volumes are listed by."""
+        return self._surface.components
+
+    def key(self, end: int) -> Floats:
+        """(n, 3) the first key (0) or the second (1)."""
+        return self._prepared.pair.key1 if end else self._prepared.pair.key0
+
+    def end_rates(self) -> tuple[Rates, Rates]:
+        """Rates at both keys, in the keys' own coordinates."""
+        motion, volume = self._prepared.embedding.motion, self._prepared.embedding.scale**-3
+        first, second = self._surface.end_rates()
+        spins = (first.spin + motion.turn, second.spin @ motion.rotation.T + motion.turn)
+        return Rates(spins[0], first.strain, volume * first.growth), Rates(
+            spins[1], second.strain, volume * second.growth
+        )
+
+    def with_end_rates(self, first: Rates, second: Rates) -> NaturalFrames:
+        """The same in-betweens with other rates at the two keys, in the keys' own coordinates."""
+        motion, volume = self._prepared.embedding.motion, self._prepared.embedding.scale**3
+        spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
+        changed = copy.copy(self)
+        changed._surface = self._surface.with_end_rates(
+            Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)
+        )
+        return changed
+
+    def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
+        """The same in-betweens with velocities (n, 3) added at the two keys."""
+        changed = copy.copy(self)
+        changed._slopes = (first, second)
+        return changed
+
+    def shape(self, time: float) -> Floats:
+        """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
+        return self._placed(self._surface.positions(time, self._anchor(self._volume.at(time), time)), time)
 
     def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
@@ -63,21 +119,21 @@ class NaturalFrames:
         for time, values, shape in zip(times.tolist(), volumes, positions, strict=True):
             folded = self._prepared.folds(values) > 0
             unfolded = self._unfolded(values, time) if folded else values
-            made.append(Frame.of(self._prepared, self._in_place(shape, time), unfolded, time, folded))
+            made.append(Frame.of(self._prepared, self._placed(shape, time), unfolded, time, folded))
         return made
 
-    def _in_place(self, shape: Floats, time: float) -> Floats:
+    def _placed(self, shape: Floats, time: float) -> Floats:
         """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
-        pair, still = self._prepared.pair, self._surface.still
+        pair, still = self._prepared.pair, self.still
         positions = self._prepared.embedding.from_cube(shape, time)
+        if self._slopes is not None:
+            positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
 
     def _anchor(self, values: Floats, time: float) -> Floats:
         """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
-        return np.asarray(
-            self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1]
-        )
+        return np.asarray(self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1])
 
     def _unfolded(self, values: Floats, time: float) -> Floats:
         """A map without folds with nearly the same landmarks, from the nearest one on the way to the second key."""
@@ -85,9 +141,7 @@ class NaturalFrames:
         nearest = maps[round(time * (len(maps) - 1))]
         return self._prepared.fitter.fit(nearest, self._prepared.landmarks @ values, _REPAIR_ITERATIONS)
 
-    def _uncrossed(
-        self, times: Floats, volumes: list[Floats], positions: list[Floats]
-    ) -> Generator[float, None, None]:
+    def _uncrossed(self, times: Floats, volumes: list[Floats], positions: list[Floats]) -> Generator[float, None, None]:
         """Where a frame crosses itself more than the keys do, let the volume's anchors win, and solve all again."""
         pair, embedding = self._prepared.pair, self._prepared.embedding
         count = len(pair.faces)
@@ -123,7 +177,7 @@ class NaturalFrames:
 
 
 def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:
-    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with the nearest triangle's twist."""
+    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with its nearest twist."""
     triangles, twist = surface.deformation.faces, surface.turning.twist
     if not twist.any():
         return Turning(prepared.turns, np.zeros_like(prepared.turns))

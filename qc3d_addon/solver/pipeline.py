@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from itertools import pairwise
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .chain import join
 from .continuation import follow_path
 from .embedding import Embedding
 from .errors import InputError
 from .foldfree import FoldFreeFitter
+from .frame import Frame
 from .keypair import KeyPair
 from .linear import LinearFrames
 from .location import interpolation_matrix
@@ -26,7 +29,7 @@ from .natural import NaturalFrames
 from .prepared import PreparedMap
 from .settings import Settings
 from .surface_path import SurfacePath
-from .tetmesh import Floats
+from .tetmesh import Floats, Ints
 
 T = TypeVar("T")
 
@@ -130,56 +133,132 @@ def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> S
     InputError
         If a time is outside 0..1.
     """
+    return chain_inbetweens([prepared], times, settings)
+
+
+def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings: Settings) -> Steps[Bake]:
+    """Frames through several keys in a row; the keys themselves, bit for bit, where the time is theirs.
+
+    Parameters
+    ----------
+    prepared : sequence of PreparedMap
+        Consecutive pairs of one mesh: the second key of each is the first of the next.
+    times : (k,)
+        0 is the first key of all, 1 the last; every pair takes the same time.
+    settings : Settings
+        In mode ``natural`` velocities are continuous at the inner keys; ``linear``, as published, turns corners there.
+
+    Raises
+    ------
+    InputError
+        If a time is outside 0..1 or the pairs are not consecutive.
+    """
     wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
     if wanted.ndim != 1 or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
-        raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (second key).")
-    seconds = dict(prepared.seconds)
+        raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (last key).")
+    for left, right in pairwise(prepared):
+        if not np.array_equal(left.pair.key1, right.pair.key0):
+            raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
+    seconds = _summed(part.seconds for part in prepared)
+    segments, local = _split(wanted, len(prepared))
     yield Progress("factor", 0.0)
     with _timed(seconds, "factor"):
-        maker = LinearFrames(prepared) if settings.mode == "linear" else NaturalFrames(prepared, settings.stretch)
+        makers = yield from _staged("factor", _makers(prepared, settings))
     yield Progress("factor", 1.0)
+    frames = np.empty((len(wanted), *prepared[0].pair.key0.shape))
+    made: dict[int, Frame] = {}
+    key_error = 0.0
     with _timed(seconds, "frames"):
-        made = yield from _staged("frames", maker.frames(wanted))
+        for number, maker in enumerate(makers):
+            members = np.flatnonzero(segments == number)
+            share = (number, len(makers))
+            produced = yield from _staged("frames", maker.frames(local[members]), share)
+            made.update(zip(members.tolist(), produced, strict=True))
+            for index, frame in zip(members, produced, strict=True):
+                frames[index] = frame.positions
+            error = _replace_by_keys(frames, members, local, prepared[number].pair)
+            key_error = max(key_error, error / prepared[number].pair.diagonal)
     yield Progress("frames", 1.0)
-    frames = np.stack([frame.positions for frame in made])
-    key_error = _replace_by_keys(frames, wanted, prepared.pair) / prepared.pair.diagonal
+    residuals = [part.landmark_residual() for part in prepared]
     report = {
-        "engine": prepared.engine,
+        "engine": ", ".join(dict.fromkeys(part.engine for part in prepared)),
         "mode": settings.mode,
         "stretch": settings.stretch,
         "quality": settings.quality,
-        "vertices": len(prepared.pair.key0),
-        "tetrahedra": len(prepared.mesh.tets),
-        "folds": {"map": prepared.folds(prepared.mapped), "frames": [frame.folds for frame in made]},
-        "certificates": [frame.certificate(float(time)) for frame, time in zip(made, wanted, strict=True)],
-        "residual": prepared.landmark_residual(),
+        "vertices": len(prepared[0].pair.key0),
+        "tetrahedra": sum(len(part.mesh.tets) for part in prepared),
+        "folds": {
+            "map": sum(part.folds(part.mapped) for part in prepared),
+            "frames": [made[index].folds for index in range(len(wanted))],
+        },
+        "certificates": [made[index].certificate(time) for index, time in enumerate(wanted.tolist())],
+        "residual": {name: max(residual[name] for residual in residuals) for name in ("rms", "max")},
         "key_error": key_error,
         "seconds": seconds,
         "peak_memory_mb": peak_memory_mb(),
-        "notes": [*prepared.notes, *maker.notes],
+        "notes": list(dict.fromkeys(note for part in (*prepared, *makers) for note in part.notes)),
     }
     return Bake(wanted, frames, report)
 
 
-def _replace_by_keys(frames: Floats, times: Floats, pair: KeyPair) -> float:
+class _FrameMaker(Protocol):
+    """Makes the frames of one pair."""
+
+    notes: tuple[str, ...]
+
+    def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
+
+
+def _makers(prepared: Sequence[PreparedMap], settings: Settings) -> Generator[float, None, Sequence[_FrameMaker]]:
+    """What makes the frames of each pair, joined so that velocities are continuous where the mode does that."""
+    if settings.mode == "linear":
+        return [LinearFrames(part) for part in prepared]
+    makers = []
+    for number, part in enumerate(prepared):
+        makers.append(NaturalFrames(part, settings.stretch))
+        yield (number + 1) / (len(prepared) + 1)
+    return join(makers) if len(makers) > 1 else makers
+
+
+def _split(times: Floats, count: int) -> tuple[Ints, Floats]:
+    """Number of the pair and time within it, 0..1, for times along a chain of ``count`` pairs."""
+    along = times * count
+    # Times like 1/3 are not exact: what is meant to be a key is one.
+    whole = np.round(along)
+    along = np.where(np.abs(along - whole) < 1e-9, whole, along)
+    segments = np.minimum(np.floor(along), count - 1)
+    return segments.astype(np.int64), along - segments
+
+
+def _summed(parts: Iterable[dict[str, float]]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for part in parts:
+        for stage, value in part.items():
+            total[stage] = total.get(stage, 0.0) + value
+    return total
+
+
+def _replace_by_keys(frames: Floats, members: Ints, times: Floats, pair: KeyPair) -> float:
     """Put the keys themselves at 0 and 1; returns how far the frames computed there were from them."""
     error = 0.0
-    for time, key in ((0.0, pair.key0), (1.0, pair.key1)):
-        for index in np.flatnonzero(times == time):
+    for index in members:
+        if times[index] in (0.0, 1.0):
+            key = pair.key1 if times[index] else pair.key0
             error = max(error, float(np.abs(frames[index] - key).max()))
             frames[index] = key
     return error
 
 
-def _staged(stage: str, work: Generator[float, None, T]) -> Steps[T]:
-    """Name the progress of a piece of work."""
+def _staged(stage: str, work: Generator[float, None, T], share: tuple[int, int] = (0, 1)) -> Steps[T]:
+    """Name the progress of a piece of work, which is the part ``share`` = (number, of so many) of its stage."""
     while True:
         try:
             done = next(work)
         except StopIteration as stop:
             result: T = stop.value
             return result
-        yield Progress(stage, done)
+        yield Progress(stage, (share[0] + done) / share[1])
 
 
 @contextmanager

@@ -29,5 +29,8 @@ class Stretch:
 
     def at(self, time: float, law: StretchLaw) -> Floats:
         """(m, d, d) stretches at ``time``: (1 - t) I + t P, or exp(t log P); positive definite for t in 0..1."""
-        values = (1.0 - time) + time * self.values if law == "linear" else self.values**time
+        return self.assembled((1.0 - time) + time * self.values if law == "linear" else self.values**time)
+
+    def assembled(self, values: Floats) -> Floats:
+        """(m, d, d) symmetric matrices with these eigenvectors and other eigenvalues (m, d)."""
         return np.asarray((self.vectors * values[:, None, :]) @ self.vectors.transpose(0, 2, 1))

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .branches import Turning
 from .rotations import rotation_vectors
 from .stiffness import scatter
-from .stretch import Stretch, StretchLaw
+from .stretch import Stretch
 from .tetmesh import Floats, Ints
 
 # Triangles thinner than this part of the mean area have no usable directions in floating point.
@@ -42,6 +41,10 @@ class TriangleDeformation:
         Symmetric in-plane stretch (m, 2, 2) from the first key to the second.
     turns : (m, 3)
         Rotation vectors in radians, the short way round.
+    spins : (m, 2, 2)
+        Rotations in the plane: from the tangents of the first key, carried along, to those of the second.
+    rows : (m,) int64
+        Which triangles of the mesh these are.
     """
 
     faces: Ints
@@ -50,6 +53,8 @@ class TriangleDeformation:
     gradients: Floats
     stretch: Stretch
     turns: Floats
+    spins: Floats
+    rows: Ints
 
     @classmethod
     def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
@@ -67,15 +72,8 @@ class TriangleDeformation:
         areas = 0.5 * double0[usable]
         weights = np.sqrt(areas)
         weights *= areas.sum() / max(float(weights.sum()), 1e-300)
-        return cls(faces, weights, bases0, gradients, Stretch.of(stretch), rotation_vectors(rotations))
-
-    def target_gradients(self, time: float, law: StretchLaw) -> Floats:
-        """(m, 3, 2) hat gradients times the stretch at ``time``: what a rotation turns into target gradients."""
-        return np.asarray(self.gradients @ self.stretch.at(time, law))
-
-    def interpolated_rotations(self, turning: Turning, time: float) -> Floats:
-        """(m, 3, 2) tangents of the first key turned until ``time``."""
-        return np.asarray(turning.at(time) @ self.bases[:, :, :2])
+        turns = rotation_vectors(rotations)
+        return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
 
     def fitted_rotations(self, positions: Floats, targets: Floats) -> Floats:
         """(m, 3, 2) tangent parts of the rotations that bring the target gradients closest to ``positions`` (n, 3)."""

@@ -14,6 +14,16 @@ from .anchors import ScrewAnchors
 from .branches import consistent_turning
 from .embedding import Embedding
 from .enclosed import ClosedComponents
+from .rates import (
+    EndCorrection,
+    Rates,
+    end_spins,
+    hermite,
+    rotation_vector_rates,
+    slope_of_strain,
+    strain_of_slope,
+    stretch_slopes,
+)
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
 from .stretch import StretchLaw
 from .surface import TriangleDeformation
@@ -50,6 +60,8 @@ class SurfacePath:
         One of each group of vertices that coincide in both keys; ``deformation`` counts in these.
     still : (n,) bool
         Vertices that stay on the straight line between the keys.
+    components : (n,) int64
+        Labels of the connected components.
     turning : Turning
         How the triangles of ``deformation`` turn.
     """
@@ -65,9 +77,7 @@ class SurfacePath:
         self.deformation = TriangleDeformation.between(self._key0, key1, faces)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
-        self.turning = consistent_turning(
-            usable.turns, face_adjacency(usable.faces), usable.weights, held, extra_turns
-        )
+        self.turning = consistent_turning(usable.turns, face_adjacency(usable.faces), usable.weights, held, extra_turns)
         if extra_turns:
             still[usable.faces[self.turning.angles > np.pi]] = False
         self.still = still[self._group]
@@ -75,6 +85,7 @@ class SurfacePath:
         self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
+        self.components = labels[self._group]
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights: Floats = np.bincount(self._group, weights=embedding.weights, minlength=count).astype(np.float64)
@@ -82,6 +93,7 @@ class SurfacePath:
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
         area = float(self.deformation.weights.sum()) or size**2
         self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        self._correction: EndCorrection | None = None
         self._factor()
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
@@ -92,6 +104,30 @@ class SurfacePath:
         stronger._anchor_weights = self._anchor_weights * strongest
         stronger._factor()
         return stronger
+
+    def end_rates(self) -> tuple[Rates, Rates]:
+        """How fast triangles turn and stretch, and volumes grow, at the first and at the second key."""
+        deformation = self.deformation
+        spins = end_spins(self.turning.swing, self.turning.twist)
+        slopes = stretch_slopes(deformation.stretch, self._law)
+        growth = self._volumes[1] - self._volumes[0]
+        # Seen in the tangents of the second key.
+        second = deformation.spins @ strain_of_slope(deformation.stretch, slopes[1])
+        second = second @ deformation.spins.transpose(0, 2, 1)
+        return Rates(spins[0], slopes[0], growth), Rates(spins[1], second, growth)
+
+    def with_end_rates(self, first: Rates, second: Rates) -> SurfacePath:
+        """The same path between the same keys with other rates at its ends."""
+        deformation = self.deformation
+        before, after = (own.toward(new) for own, new in zip(self.end_rates(), (first, second), strict=True))
+        strain = deformation.spins.transpose(0, 2, 1) @ after.strain @ deformation.spins
+        corrected = copy.copy(self)
+        corrected._correction = EndCorrection(
+            (before.spin, rotation_vector_rates(self.turning.swing, after.spin)),
+            (before.strain, slope_of_strain(deformation.stretch, strain)),
+            (before.growth, after.growth),
+        )
+        return corrected
 
     def _factor(self) -> None:
         deformation, free = self.deformation, self._free
@@ -120,8 +156,13 @@ class SurfacePath:
         """
         deformation = self.deformation
         drawn_to = self._screws.positions(time) if anchor is None else anchor[self.vertices]
-        targets = deformation.target_gradients(time, self._law)
-        rotations = deformation.interpolated_rotations(self.turning, time)
+        stretch = deformation.stretch.at(time, self._law)
+        turn_change: Floats | float = 0.0
+        if self._correction is not None:
+            stretch = stretch + hermite(time, *self._correction.stretches)
+            turn_change = hermite(time, *self._correction.turns)
+        targets = deformation.gradients @ stretch
+        rotations = self.turning.at(time, turn_change) @ deformation.bases[:, :, :2]
         positions = self._solved(drawn_to, rotations, targets, drawn_to, time)
         for _ in range(SWEEPS - 1):
             fitted = self._refitted(drawn_to, positions, targets, time)
@@ -157,6 +198,8 @@ class SurfacePath:
         direction = np.zeros_like(positions)
         direction[self._free] = self._factored.solve(slope[self._free])
         wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
+        if self._correction is not None:
+            wanted = wanted + hermite(time, *self._correction.volumes)
         # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
         most = _LARGEST_VOLUME_STEP * np.abs(wanted)
         missing = np.clip(wanted - self._closed.volumes(positions), -most, most)

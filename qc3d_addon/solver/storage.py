@@ -18,6 +18,7 @@ from .rotations import determinants
 from .tetmesh import TetMesh
 
 FORMAT_VERSION = 1
+_SEAL_LENGTH = 32
 _DAMAGED = "The stored map is damaged; prepare the keys again."
 
 
@@ -30,8 +31,12 @@ def fingerprint(pair: KeyPair) -> str:
     return digest.hexdigest()
 
 
+def _seal(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest()
+
+
 def to_bytes(prepared: PreparedMap) -> bytes:
-    """Store the mesh and the map; the keys themselves are not stored, only their digest."""
+    """Store the mesh and the map behind a seal; the keys themselves are not stored, only their digest."""
     header = {
         "version": FORMAT_VERSION,
         "fingerprint": fingerprint(prepared.pair),
@@ -48,7 +53,7 @@ def to_bytes(prepared: PreparedMap) -> bytes:
         maps=prepared.maps,
         turns=prepared.turns,
     )
-    return buffer.getvalue()
+    return _seal(buffer.getvalue()) + buffer.getvalue()
 
 
 def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
@@ -59,8 +64,11 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
     InputError
         If the bytes are damaged, of another version, or belong to other keys.
     """
+    # Unpacking what is damaged can fail in many ways, or not at all.
+    if data[:_SEAL_LENGTH] != _seal(data[_SEAL_LENGTH:]):
+        raise InputError(_DAMAGED)
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+        with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
             header = json.loads(bytes(stored["header"]))
             version, owner = header["version"], header["fingerprint"]
             extra_turns = int(header["extra_turns"])
@@ -79,10 +87,10 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
         raise InputError(_DAMAGED)
     if tets.ndim != 2 or tets.shape[1] != 4 or not len(tets) or tets.min() < 0 or tets.max() >= len(points):
         raise InputError(_DAMAGED)
-    if turns.shape != (len(tets), 3) or not (np.isfinite(maps).all() and np.isfinite(turns).all()):
+    if turns.shape != (len(tets), 3) or not all(np.isfinite(numbers).all() for numbers in (points, maps, turns)):
         raise InputError(_DAMAGED)
     mesh = TetMesh(points, tets)
-    # Written so that a volume that is not a number counts as damage too.
-    if not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps) or not mesh.volumes.min() > 0.0:
+    # Jacobians can be computed only where no volume is zero.
+    if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
     return PreparedMap(pair, mesh, maps, turns, extra_turns, engine, notes)

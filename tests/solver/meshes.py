@@ -134,6 +134,14 @@ def bent(points: Floats, angle: float) -> Floats:
     return np.column_stack([x, points[:, 1], z])
 
 
+def arced(points: Floats, angle: float) -> Floats:
+    """A bar of length 5 whose upper half is bent along an arc; the lower half stays exactly where it is."""
+    radius = 2.5 / angle
+    along = (points[:, 2] - 2.5) / radius
+    x, z = radius - (radius - points[:, 0]) * np.cos(along), 2.5 + (radius - points[:, 0]) * np.sin(along)
+    return np.where(points[:, 2:] > 2.5, np.column_stack([x, points[:, 1], z]), points)
+
+
 def enclosed_volume(points: Floats, faces: Ints) -> float:
     """Volume inside a closed surface."""
     first, second, third = (points[faces[:, corner]] for corner in range(3))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from .chain import join
 from .continuation import follow_path
+from .easing import eased
 from .embedding import Embedding
 from .errors import InputError
 from .foldfree import FoldFreeFitter
@@ -144,7 +145,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
     prepared : sequence of PreparedMap
         Consecutive pairs of one mesh: the second key of each is the first of the next.
     times : (k,)
-        0 is the first key of all, 1 the last; every pair takes the same time.
+        0 is the first key of all, 1 the last; every pair takes the same time before ``settings.easing``.
     settings : Settings
         In mode ``natural`` velocities are continuous at the inner keys; ``linear``, as published, turns corners there.
 
@@ -160,7 +161,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         if not np.array_equal(left.pair.key1, right.pair.key0):
             raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
     seconds = _summed(part.seconds for part in prepared)
-    segments, local = _split(wanted, len(prepared))
+    segments, local = _split(eased(wanted, settings.easing), len(prepared))
     yield Progress("factor", 0.0)
     with _timed(seconds, "factor"):
         makers = yield from _staged("factor", _makers(prepared, settings))
@@ -179,11 +180,13 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
             error = _replace_by_keys(frames, members, local, prepared[number].pair)
             key_error = max(key_error, error / prepared[number].pair.diagonal)
     yield Progress("frames", 1.0)
+    notes = [note for part in prepared for note in part.notes] + [note for maker in makers for note in maker.notes]
     residuals = [part.landmark_residual() for part in prepared]
     report = {
         "engine": ", ".join(dict.fromkeys(part.engine for part in prepared)),
         "mode": settings.mode,
         "stretch": settings.stretch,
+        "easing": settings.easing,
         "quality": settings.quality,
         "vertices": len(prepared[0].pair.key0),
         "tetrahedra": sum(len(part.mesh.tets) for part in prepared),
@@ -196,7 +199,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         "key_error": key_error,
         "seconds": seconds,
         "peak_memory_mb": peak_memory_mb(),
-        "notes": list(dict.fromkeys(note for part in (*prepared, *makers) for note in part.notes)),
+        "notes": list(dict.fromkeys(notes)),
     }
     return Bake(wanted, frames, report)
 

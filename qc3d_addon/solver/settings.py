@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from .easing import Easing
 from .errors import InputError
 from .stretch import StretchLaw
 
@@ -25,6 +26,8 @@ class Settings:
         How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme.
     stretch
         How ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
+    easing
+        How far along the way the in-betweens are: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
     extra_turns
         Full turns, -100..100, that two shapes cannot tell: added to components without still vertices; where
         something is still, any number but 0 lets what is back in its place after whole turns turn with the rest.
@@ -40,6 +43,7 @@ class Settings:
 
     mode: Mode = "natural"
     stretch: StretchLaw = "linear"
+    easing: Easing = "linear"
     extra_turns: int = 0
     engine: Engine = "auto"
     quality: Quality = "normal"
@@ -47,7 +51,8 @@ class Settings:
     mesh_time_limit: float = 120.0
 
     def __post_init__(self) -> None:
-        for name, kind in (("mode", Mode), ("stretch", StretchLaw), ("engine", Engine), ("quality", Quality)):
+        kinds = {"mode": Mode, "stretch": StretchLaw, "easing": Easing, "engine": Engine, "quality": Quality}
+        for name, kind in kinds.items():
             value, choices = getattr(self, name), get_args(kind)
             if value not in choices:
                 raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")

@@ -83,16 +83,6 @@ class BakeChoices(PairChoices):
         name="End", description="Frame at which the slider is at the second key", default=25, options={'SKIP_SAVE'}
     )
 
-    def request(self) -> BakeRequest:
-        """The choices as a request; raises InputError where they do not fit together."""
-        return BakeRequest(
-            from_key=self.from_key,
-            to_key=self.to_key,
-            count=self.count,
-            settings=Settings(mode=self.mode, engine=self.engine, quality=self.quality),
-            keyframes=(self.frame_start, self.frame_end) if self.use_keyframes else None,
-        )
-
 
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
@@ -104,3 +94,18 @@ def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSe
     for name in shared - {"rna_type"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))
+
+
+def bake_request(choices: BakeChoices) -> BakeRequest:
+    """The choices as a request; raises InputError where they do not fit together.
+
+    Not a method of the choices: the Python module of Blender 4.2 crashes at its end where a registered class inherits
+    both properties and methods from a class of its own.
+    """
+    return BakeRequest(
+        from_key=choices.from_key,
+        to_key=choices.to_key,
+        count=choices.count,
+        settings=Settings(mode=choices.mode, engine=choices.engine, quality=choices.quality),
+        keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
+    )

@@ -10,7 +10,7 @@ import bpy
 
 from ...solver.errors import QC3DError
 from .. import bake
-from ..properties import BakeChoices, fill_from_panel
+from ..properties import BakeChoices, bake_request, fill_from_panel
 from .common import poll_active_object, progress_shown
 
 
@@ -30,7 +30,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, bpy.types.Operator):
         fill_from_panel(self.properties, obj.qc3d)
         try:
             with progress_shown(context) as on_progress:
-                result = bake.bake_object(obj, self.request(), on_progress)
+                result = bake.bake_object(obj, bake_request(self), on_progress)
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rotation and stretch of triangles between two keys: against maps whose rotation and stretch are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from qc3d_addon.solver.rotations import rotation_matrices
+from qc3d_addon.solver.stretch import StretchLaw
+from qc3d_addon.solver.surface import TriangleDeformation, face_normals, hat_gradients, tangent_bases
+from qc3d_addon.solver.tetmesh import Floats
+
+from .meshes import enclosed_volume, icosphere, twisted
+
+BALL, FACES = icosphere(1)
+# Half of the way to three times the size.
+LAWS: dict[StretchLaw, float] = {"linear": 2.0, "logarithmic": 3.0**0.5}
+
+
+def deformation_gradients(deformation: TriangleDeformation, key1: Floats) -> Floats:
+    """(m, 3, 2) in space, from the tangent bases of the first key."""
+    return np.asarray(np.einsum("mki,mkj->mij", key1[deformation.faces], deformation.gradients))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_rotation_is_a_rotation_without_stretch(seed: int) -> None:
+    turn = Rotation.random(random_state=seed)
+    moved = BALL @ turn.as_matrix().T + [1.0, 2.0, 3.0]
+    deformation = TriangleDeformation.between(BALL, moved, FACES)
+    expected = np.broadcast_to(turn.as_matrix(), (len(FACES), 3, 3))
+    np.testing.assert_allclose(rotation_matrices(deformation.turns), expected, rtol=0.0, atol=1e-12)
+    stretch = deformation.stretch.at(1.0, "linear")
+    np.testing.assert_allclose(stretch, np.broadcast_to(np.eye(2), stretch.shape), rtol=0.0, atol=1e-12)
+
+
+def test_a_scaling_is_a_stretch_without_rotation() -> None:
+    deformation = TriangleDeformation.between(BALL, 3.0 * BALL, FACES)
+    np.testing.assert_allclose(deformation.turns, 0.0, rtol=0.0, atol=1e-12)
+    for law, factor in LAWS.items():
+        halfway = deformation.stretch.at(0.5, law)
+        np.testing.assert_allclose(halfway, factor * np.broadcast_to(np.eye(2), halfway.shape), rtol=0.0, atol=1e-12)
+
+
+def test_rotation_and_stretch_make_the_deformation() -> None:
+    key1 = twisted(BALL, 1.5) * [1.0, 0.8, 1.4]
+    deformation = TriangleDeformation.between(BALL, key1, FACES)
+    made = rotation_matrices(deformation.turns) @ deformation.bases[:, :, :2] @ deformation.stretch.at(1.0, "linear")
+    np.testing.assert_allclose(made, deformation_gradients(deformation, key1), rtol=0.0, atol=1e-12)
+
+
+def test_normals_are_turned_onto_normals() -> None:
+    key1 = twisted(BALL, 1.5) * [1.0, 0.8, 1.4]
+    deformation = TriangleDeformation.between(BALL, key1, FACES)
+    normals0, normals1 = (tangent_bases(key, FACES)[:, :, 2] for key in (BALL, key1))
+    turned = np.einsum("mij,mj->mi", rotation_matrices(deformation.turns), normals0)
+    np.testing.assert_allclose(turned, normals1, rtol=0.0, atol=1e-12)
+
+
+def test_hat_gradients_take_linear_functions_apart() -> None:
+    bases = tangent_bases(BALL, FACES)
+    gradients = hat_gradients(BALL, FACES, bases)
+    np.testing.assert_allclose(gradients.sum(axis=1), 0.0, rtol=0.0, atol=1e-12)
+    slope = np.array([1.0, -2.0, 0.5])
+    found = np.einsum("mk,mki->mi", (BALL @ slope)[FACES], gradients)
+    np.testing.assert_allclose(found, np.einsum("i,mij->mj", slope, bases[:, :, :2]), rtol=0.0, atol=1e-12)
+
+
+def test_bases_are_right_handed_and_orthonormal() -> None:
+    bases = tangent_bases(BALL, FACES)
+    squares = bases.transpose(0, 2, 1) @ bases
+    np.testing.assert_allclose(squares, np.broadcast_to(np.eye(3), squares.shape), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.det(bases), 1.0, rtol=0.0, atol=1e-14)
+    # Normals of the ball point out.
+    assert (np.einsum("mi,mi->m", bases[:, :, 2], BALL[FACES].mean(axis=1) - 0.5) > 0.0).all()
+
+
+def test_face_normals_are_twice_the_areas() -> None:
+    normals = face_normals(BALL, FACES)
+    np.testing.assert_allclose(normals.sum(axis=0), 0.0, rtol=0.0, atol=1e-14)
+    volume = np.einsum("mi,mi->", normals, BALL[FACES].mean(axis=1)) / 6.0
+    assert volume == pytest.approx(enclosed_volume(BALL, FACES), rel=1e-12)
+
+
+def test_triangles_without_an_area_in_either_key_are_left_out() -> None:
+    key1 = BALL.copy()
+    key1[FACES[7, 0]] = key1[FACES[7, 1]]
+    faces = np.concatenate([FACES, [[0, 0, 1], [3, 3, 3]]])
+    deformation = TriangleDeformation.between(BALL, key1, faces)
+    collapsed = np.isin(FACES, FACES[7, :2]).sum(axis=1) == 2
+    np.testing.assert_array_equal(deformation.faces, FACES[~collapsed])
+    assert np.isfinite(deformation.turns).all()
+
+
+def test_fitted_rotations_find_the_rotation_of_positions() -> None:
+    turn = Rotation.random(random_state=1).as_matrix()
+    deformation = TriangleDeformation.between(BALL, 1.5 * BALL, FACES)
+    targets = deformation.gradients @ deformation.stretch.at(0.3, "linear")
+    fitted = deformation.fitted_rotations(BALL @ turn.T, targets)
+    np.testing.assert_allclose(fitted, turn @ deformation.bases[:, :, :2], rtol=0.0, atol=1e-12)
+
+
+def test_the_load_of_its_own_gradients_is_in_balance_with_its_stiffness() -> None:
+    deformation = TriangleDeformation.between(BALL, BALL, FACES)
+    load = deformation.load(deformation.bases[:, :, :2], deformation.gradients, len(BALL))
+    energy = deformation.gradients @ deformation.gradients.transpose(0, 2, 1) * deformation.weights[:, None, None]
+    forces = np.zeros_like(BALL)
+    np.add.at(forces, FACES, energy @ BALL[FACES])
+    np.testing.assert_allclose(load, forces, rtol=0.0, atol=1e-12)

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map of the cube between the identity and the fitted map, rotation kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from qc3d_addon.solver.branches import Turning
+from qc3d_addon.solver.representation import polar_decomposition
+from qc3d_addon.solver.rotations import rotation_matrices, rotation_vectors
+from qc3d_addon.solver.stretch import StretchLaw
+from qc3d_addon.solver.tetmesh import Floats, TetMesh
+from qc3d_addon.solver.volume_path import VolumePath
+
+from .meshes import jittered_grid, kuhn_grid
+
+
+def path_of(mesh: TetMesh, values: Floats, inside: Floats, law: StretchLaw = "linear") -> VolumePath:
+    turns = rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation)
+    return VolumePath(mesh, values, Turning(turns, np.zeros_like(turns)), inside, law)
+
+
+def whirled(points: Floats, angle: float) -> Floats:
+    """The middle of the cube turned as a whole, nothing on its faces, a gradual change between."""
+    offsets = points - 0.5
+    fading = np.clip((0.45 - np.linalg.norm(offsets, axis=1)) / 0.25, 0.0, 1.0)
+    turns = angle * fading[:, None] * np.array([0.0, 0.6, 0.8])
+    return np.asarray(0.5 + np.einsum("nij,nj->ni", rotation_matrices(turns), offsets))
+
+
+@pytest.mark.parametrize("law", ["linear", "logarithmic"])
+def test_the_identity_and_the_map_at_the_ends(law: StretchLaw) -> None:
+    mesh = jittered_grid(8, seed=1)
+    values = whirled(mesh.points, 0.8)
+    assert np.linalg.det(mesh.jacobians(values)).min() > 0.0
+    inside = np.random.default_rng(0).uniform(0.0, 1.0, len(mesh.tets))
+    path = path_of(mesh, values, inside, law)
+    np.testing.assert_allclose(path.at(0.0), mesh.points, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(path.at(1.0), values, rtol=0.0, atol=1e-11)
+    np.testing.assert_array_equal(path.at(0.4)[mesh.on_cube_face], mesh.points[mesh.on_cube_face])
+
+
+def test_stretches_along_the_axes_are_interpolated_by_their_law() -> None:
+    mesh = kuhn_grid(4)
+    values = np.column_stack([mesh.points[:, 0] ** 2, mesh.points[:, 1], np.sqrt(mesh.points[:, 2])])
+    everywhere = np.ones(len(mesh.tets))
+    linear = path_of(mesh, values, everywhere).at(0.3)
+    np.testing.assert_allclose(linear, 0.7 * mesh.points + 0.3 * values, rtol=0.0, atol=1e-12)
+
+
+def test_what_turns_as_a_whole_inside_keeps_its_shape() -> None:
+    mesh = jittered_grid(10, seed=2)
+    values = whirled(mesh.points, 1.0)
+    core = np.linalg.norm(mesh.points - 0.5, axis=1) < 0.2
+    inside = core[mesh.tets].all(axis=1)
+    halfway = path_of(mesh, values, inside.astype(np.float64)).at(0.5)
+    stretch = polar_decomposition(mesh.jacobians(halfway)[inside]).stretch
+    np.testing.assert_allclose(stretch, np.broadcast_to(np.eye(3), stretch.shape), rtol=0.0, atol=0.01)
+    np.testing.assert_allclose(halfway[core], whirled(mesh.points, 0.5)[core], rtol=0.0, atol=0.01)

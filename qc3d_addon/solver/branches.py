@@ -113,7 +113,7 @@ class _Forest:
 
     def __init__(self, turns: Floats, adjacency: Ints) -> None:
         count = len(turns)
-        first, second = adjacency.T
+        first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 takes no others
         # A relative rotation of zero must still count as an edge of the graph.
         cost = _relative_angles(turns[first], turns[second]) + 1e-9
         tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())

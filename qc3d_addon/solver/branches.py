@@ -15,11 +15,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.spatial import cKDTree
 
 from .rotations import nearest_branch, rotation_matrices, rotation_vectors
 from .tetmesh import Bools, Floats, Ints
 
-_MOST_SWING = 1.1 * np.pi
+_MOST_SWING = 1.55 * np.pi
+_FAIR_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +53,9 @@ class Turning:
         return np.asarray(np.maximum(np.linalg.norm(self.swing, axis=1), np.linalg.norm(self.twist, axis=1)))
 
 
-def consistent_turning(turns: Floats, adjacency: Ints, weights: Floats, held: Bools, extra_turns: int) -> Turning:
+def consistent_turning(
+    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, extra_turns: int
+) -> Turning:
     """Turn every element so that neighbours agree, beyond 180 degrees and beyond 360 where they do.
 
     Parameters
@@ -60,35 +64,52 @@ def consistent_turning(turns: Floats, adjacency: Ints, weights: Floats, held: Bo
         Rotation vectors, angles in [0, pi].
     adjacency : (k, 2) int64
         Pairs of neighbouring elements.
+    centres : (m, 3)
+        Where the elements are, for parts that hang together with nothing.
     weights : (m,)
         What elements count in the axis of their part.
     held : (m,) bool
         Elements that touch what both keys leave in place.
     extra_turns : int
-        Full turns to add to parts that nothing holds.
+        Full turns to add to parts that nothing holds, in the direction in which they turn.
 
     Notes
     -----
     The rotation vector of an element is followed to its neighbours by the nearest branch, which is right up to a full
-    turn: there the axis is lost. A part that turns by more than ``_MOST_SWING`` is therefore split into a twist about
-    its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
+    turn: there the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split into
+    a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
+
+    Within a part the element that turns least goes the short way round. A part that nothing holds, such as a button
+    on a sleeve, goes the way that the surface of the largest part does where it is nearest.
     """
     count = len(turns)
     if not count:
         return Turning(turns.copy(), turns.copy())
     forest = _Forest(turns, adjacency)
-    vectors = forest.carried(turns, nearest_branch)
+    loose = ~np.isin(forest.labels, forest.labels[held])
+    vectors = _agreeing_parts(forest, forest.carried(turns, nearest_branch), centres, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
     phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
-    loose = ~np.isin(forest.labels, forest.labels[held])
     phases[loose] += 2.0 * np.pi * extra_turns
-    furthest = np.zeros(forest.labels.max() + 1)
-    np.maximum.at(furthest, forest.labels, np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)))
-    twists = (furthest > _MOST_SWING)[forest.labels]
+    far = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)) > _MOST_SWING
+    share = np.bincount(forest.labels, weights=weights * far) / np.bincount(forest.labels, weights=weights)
+    twists = (share > _FAIR_SHARE)[forest.labels] | (loose & (extra_turns != 0))
     twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
+
+
+def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, loose: Bools) -> Floats:
+    """Rotation vectors (m, 3) with every loose part in the branch that is nearest to the largest part's."""
+    largest = forest.labels == np.argmax(np.bincount(forest.labels))
+    others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
+    if not len(others):
+        return vectors
+    nearest = np.flatnonzero(largest)[cKDTree(centres[largest]).query(centres[others])[1]]
+    started = vectors.copy()
+    started[others] = nearest_branch(vectors[others], vectors[nearest])
+    return forest.carried(started, nearest_branch)
 
 
 def swing_beside(turns: Floats, twist: Floats) -> Floats:
@@ -101,11 +122,13 @@ def _nearest_phase(phases: Floats, references: Floats) -> Floats:
 
 
 def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
-    """(parts, 3) unit axes about which the parts turn most."""
+    """(parts, 3) unit axes about which the parts turn most, pointing the way in which they turn."""
     products = weights[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
     summed = np.zeros((labels.max() + 1, 3, 3))
     np.add.at(summed, labels, products)
-    return np.asarray(np.linalg.eigh(summed)[1][:, :, 2])
+    axes = np.linalg.eigh(summed)[1][:, :, 2]
+    along = np.bincount(labels, weights=weights * np.einsum("ki,ki->k", vectors, axes[labels]))
+    return np.asarray(axes * np.where(along < 0.0, -1.0, 1.0)[:, None])
 
 
 class _Forest:
@@ -121,6 +144,7 @@ class _Forest:
         self.labels: Ints = np.asarray(labels, dtype=np.int64)
         by_angle = np.lexsort((np.linalg.norm(turns, axis=1), labels))
         roots = by_angle[np.searchsorted(labels[by_angle], np.arange(parts))]
+        self.roots: Ints = roots
         # One more node joins all roots, so that one search covers every part.
         rows, columns = tree.nonzero()
         rows = np.concatenate([rows, np.full(len(roots), count)])

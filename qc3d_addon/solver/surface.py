@@ -18,7 +18,7 @@ from .stiffness import scatter
 from .stretch import Stretch
 from .tetmesh import Floats, Ints
 
-# Triangles thinner than this part of the mean area have no usable directions in floating point.
+# Triangles thinner than this part of the largest area have no usable directions in floating point.
 _THINNEST = 1e-10
 
 
@@ -60,7 +60,7 @@ class TriangleDeformation:
     def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
         """Deformation from ``key0`` (n, 3) to ``key1`` of the triangles of ``faces`` that have an area in both."""
         double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
-        usable = (double0 > _THINNEST * double0.mean()) & (double1 > _THINNEST * double1.mean())
+        usable = np.logical_and(*(double > _THINNEST * double.max(initial=0.0) for double in (double0, double1)))
         faces = faces[usable]
         bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
         gradients = hat_gradients(key0, faces, bases0)

@@ -35,6 +35,8 @@ SWEEPS = 20
 # Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
 _OVER_RELAXATION = 1.7
 _LARGEST_VOLUME_STEP = 0.1
+_LAST_VOLUME_STEPS = 12
+_VOLUME_TOLERANCE = 1e-12
 
 
 class SurfacePath:
@@ -77,7 +79,10 @@ class SurfacePath:
         self.deformation = TriangleDeformation.between(self._key0, key1, faces)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
-        self.turning = consistent_turning(usable.turns, face_adjacency(usable.faces), usable.weights, held, extra_turns)
+        centres = self._key0[usable.faces].mean(axis=1)
+        self.turning = consistent_turning(
+            usable.turns, face_adjacency(usable.faces), centres, usable.weights, held, extra_turns
+        )
         if extra_turns:
             still[usable.faces[self.turning.angles > np.pi]] = False
         self.still = still[self._group]
@@ -168,7 +173,7 @@ class SurfacePath:
             fitted = self._refitted(drawn_to, positions, targets, time)
             positions = positions + _OVER_RELAXATION * (fitted - positions)
         positions = self._refitted(drawn_to, positions, targets, time)
-        return self._with_volume(positions, time)[self._group]
+        return self._with_volume(positions, time, _LAST_VOLUME_STEPS)[self._group]
 
     def _refitted(self, anchor: Floats, positions: Floats, targets: Floats, time: float) -> Floats:
         rotations = self.deformation.fitted_rotations(positions, targets)
@@ -180,7 +185,7 @@ class SurfacePath:
         positions = self._key0 + time * self._travel
         load = load[self._free] - self._held_columns @ positions[~self._free]
         positions[self._free] = self._factored.solve(load)
-        return self._with_volume(positions, time)
+        return self._with_volume(positions, time, 1)
 
     def _spring_load(self, positions: Floats, time: float) -> Floats:
         """(n, 3) forces of edges without triangles: their present direction at the interpolated length."""
@@ -190,20 +195,24 @@ class SurfacePath:
         spans *= np.where(present > 1e-12, wanted / np.maximum(present, 1e-12), 0.0)[:, None]
         return scatter(self._springs, np.stack([-spans, spans], axis=1), len(positions))
 
-    def _with_volume(self, positions: Floats, time: float) -> Floats:
-        """One Newton step along K^-1 grad V towards the interpolated volume of every closed component."""
+    def _with_volume(self, positions: Floats, time: float, steps: int) -> Floats:
+        """Newton steps along K^-1 grad V towards the interpolated volume of every closed component."""
         if self._closed.empty:
             return positions
-        slope = self._closed.volume_gradient(positions)
-        direction = np.zeros_like(positions)
-        direction[self._free] = self._factored.solve(slope[self._free])
         wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
         if self._correction is not None:
             wanted = wanted + hermite(time, *self._correction.volumes)
         # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
         most = _LARGEST_VOLUME_STEP * np.abs(wanted)
-        missing = np.clip(wanted - self._closed.volumes(positions), -most, most)
-        return self._closed.stepped(positions, direction, slope, missing)
+        for _ in range(steps):
+            missing = wanted - self._closed.volumes(positions)
+            if (np.abs(missing) <= _VOLUME_TOLERANCE * np.abs(wanted)).all():
+                break
+            slope = self._closed.volume_gradient(positions)
+            direction = np.zeros_like(positions)
+            direction[self._free] = self._factored.solve(slope[self._free])
+            positions = self._closed.stepped(positions, direction, slope, np.clip(missing, -most, most))
+        return positions
 
 
 def _spans(positions: Floats, edges: Ints) -> Floats:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ SETTINGS = Settings(engine="delaunay", quality="draft")
 
 
 def chain_of(keys: Sequence[Floats], settings: Settings = SETTINGS) -> list[PreparedMap]:
-    pairs = [KeyPair.checked(first, second, FACES) for first, second in zip(keys[:-1], keys[1:], strict=True)]
+    pairs = [KeyPair.checked(first, second, FACES) for first, second in pairwise(keys)]
     return [finish(prepare(pair, settings)) for pair in pairs]
 
 

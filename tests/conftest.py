@@ -9,9 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("QC3D_DATA") or REPOSITORY.parent / "shared" / "data").resolve()
+
+# A busy machine is no failure; and continuous integration tries the same examples every time.
+settings.register_profile("qc3d", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("qc3d")
 
 
 def pytest_report_header() -> str:

@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one slider of a chain: a custom property of the object, the drivers that read it, and its keyframes."""
+"""The one slider of a chain: a custom property of the object, the drivers that read it, and its keyframes.
+
+At 0 the slider shows the first key, at 1 the second, each through a copy that the bake makes, since the animator's own
+keys are not touched; the Basis needs no copy. Between two keys neither of which is the Basis, the slider thus shows the
+first key from the moment of the bake on. What other keys are on adds to it, as shape keys do.
+"""
 
 from __future__ import annotations
 

@@ -76,8 +76,8 @@ def consistent_turning(
     Notes
     -----
     The rotation vector of an element is followed to its neighbours by the nearest branch, which is right up to a full
-    turn: there the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split into
-    a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
+    turn: there the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
+    into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
     Within a part the element that turns least goes the short way round. A part that nothing holds, such as a button
     on a sleeve, goes the way that the surface of the largest part does where it is nearest.

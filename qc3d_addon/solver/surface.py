@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from .rotations import rotation_vectors
-from .stiffness import scatter
 from .stretch import Stretch
 from .tetmesh import Floats, Ints
 
@@ -75,18 +75,49 @@ class TriangleDeformation:
         turns = rotation_vectors(rotations)
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
 
-    def fitted_rotations(self, positions: Floats, targets: Floats) -> Floats:
-        """(m, 3, 2) tangent parts of the rotations that bring the target gradients closest to ``positions`` (n, 3)."""
-        bases = tangent_bases(positions, self.faces)
-        corners = np.einsum("mki,mij->mkj", positions[self.faces], bases[:, :, :2])
-        planar = np.einsum("mki,mkj->mij", corners, targets)
-        spin = _planar_rotations(planar)
-        return np.asarray(bases[:, :, :2] @ spin)
+    def gradient_operator(self, count: int) -> csr_array:
+        """(2m, count): takes positions (count, 3) to their gradients along the first, then the second tangents."""
+        triangles = len(self.faces)
+        columns = np.concatenate([self.faces, self.faces]).ravel()
+        values = self.gradients.transpose(2, 0, 1).ravel()
+        starts = np.arange(0, 6 * triangles + 1, 3)
+        return csr_array((values, columns, starts), shape=(2 * triangles, count))
 
-    def load(self, rotations: Floats, targets: Floats, count: int) -> Floats:
-        """(n, 3) right-hand side of the least-squares fit for rotated target gradients."""
-        forces = self.weights[:, None, None] * (targets @ rotations.transpose(0, 2, 1))
-        return scatter(self.faces, forces, count)
+
+def tangents_of(rotations: Floats, bases: Floats) -> Floats:
+    """(2, m, 3) the two tangents of ``bases`` (m, 3, 3) after ``rotations`` (m, 3, 3)."""
+    return np.ascontiguousarray((rotations @ bases[:, :, :2]).transpose(2, 0, 1))
+
+
+def stretched(stretch: Floats, vectors: Floats) -> Floats:
+    """(2, m, 3) pairs of vectors (2, m, 3), mixed by symmetric stretches (m, 2, 2)."""
+    first, second = vectors
+    mixed = stretch[:, 0, 1][:, None]
+    return np.stack(
+        [stretch[:, 0, 0][:, None] * first + mixed * second, mixed * first + stretch[:, 1, 1][:, None] * second]
+    )
+
+
+def closest_tangents(vectors: Floats) -> Floats:
+    """(2, m, 3) orthonormal pairs closest to pairs of vectors (2, m, 3): the polar factor A (A^T A)^-1/2.
+
+    The inverse root of the 2 x 2 matrix C = A^T A comes from the theorem of Cayley and Hamilton: with s = sqrt(det C),
+    C^1/2 = (C + s I) / sqrt(tr C + 2 s).
+    """
+    first, second = vectors
+    one, two = (np.einsum("mi,mi->m", vector, vector) for vector in vectors)
+    mixed = np.einsum("mi,mi->m", first, second)
+    trace = one + two
+    # A triangle that is a line for a moment still gets two directions; the floor is far below any real triangle.
+    root = np.sqrt(np.maximum(one * two - mixed**2, (_THINNEST * trace) ** 2))
+    scale = 1.0 / np.maximum(root * np.sqrt(trace + 2.0 * root), 1e-300)
+    across = (scale * mixed)[:, None]
+    return np.stack(
+        [
+            (scale * (two + root))[:, None] * first - across * second,
+            (scale * (one + root))[:, None] * second - across * first,
+        ]
+    )
 
 
 def face_normals(positions: Floats, faces: Ints) -> Floats:

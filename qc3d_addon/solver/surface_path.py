@@ -7,7 +7,7 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from .anchors import ScrewAnchors
@@ -26,7 +26,7 @@ from .rates import (
 )
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
 from .stretch import StretchLaw
-from .surface import TriangleDeformation
+from .surface import TriangleDeformation, closest_tangents, stretched, tangents_of
 from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
@@ -98,6 +98,8 @@ class SurfacePath:
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
         area = float(self.deformation.weights.sum()) or size**2
         self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        self._gradient = usable.gradient_operator(count)
+        self._divergence = csr_array(self._gradient.T @ diags_array(np.tile(usable.weights, 2)))
         self._correction: EndCorrection | None = None
         self._factor()
 
@@ -166,22 +168,21 @@ class SurfacePath:
         if self._correction is not None:
             stretch = stretch + hermite(time, *self._correction.stretches)
             turn_change = hermite(time, *self._correction.turns)
-        targets = deformation.gradients @ stretch
-        rotations = self.turning.at(time, turn_change) @ deformation.bases[:, :, :2]
-        positions = self._solved(drawn_to, rotations, targets, drawn_to, time)
+        tangents = tangents_of(self.turning.at(time, turn_change), deformation.bases)
+        positions = self._solved(drawn_to, tangents, stretch, drawn_to, time)
         for _ in range(SWEEPS - 1):
-            fitted = self._refitted(drawn_to, positions, targets, time)
+            fitted = self._refitted(drawn_to, positions, stretch, time)
             positions = positions + _OVER_RELAXATION * (fitted - positions)
-        positions = self._refitted(drawn_to, positions, targets, time)
+        positions = self._refitted(drawn_to, positions, stretch, time)
         return self._with_volume(positions, time, _LAST_VOLUME_STEPS)[self._group]
 
-    def _refitted(self, anchor: Floats, positions: Floats, targets: Floats, time: float) -> Floats:
-        rotations = self.deformation.fitted_rotations(positions, targets)
-        return self._solved(anchor, rotations, targets, positions, time)
+    def _refitted(self, anchor: Floats, positions: Floats, stretch: Floats, time: float) -> Floats:
+        gradients = (self._gradient @ positions).reshape(2, -1, 3)
+        return self._solved(anchor, closest_tangents(stretched(stretch, gradients)), stretch, positions, time)
 
-    def _solved(self, anchor: Floats, rotations: Floats, targets: Floats, previous: Floats, time: float) -> Floats:
-        load = self.deformation.load(rotations, targets, len(anchor)) + self._anchor_weights[:, None] * anchor
-        load += self._spring_load(previous, time)
+    def _solved(self, anchor: Floats, tangents: Floats, stretch: Floats, previous: Floats, time: float) -> Floats:
+        load = self._divergence @ stretched(stretch, tangents).reshape(-1, 3)
+        load += self._anchor_weights[:, None] * anchor + self._spring_load(previous, time)
         positions = self._key0 + time * self._travel
         load = load[self._free] - self._held_columns @ positions[~self._free]
         positions[self._free] = self._factored.solve(load)

@@ -12,7 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.stretch import StretchLaw
-from qc3d_addon.solver.surface import TriangleDeformation, face_normals, hat_gradients, tangent_bases
+from qc3d_addon.solver.surface import (
+    TriangleDeformation,
+    closest_tangents,
+    face_normals,
+    hat_gradients,
+    stretched,
+    tangent_bases,
+    tangents_of,
+)
 from qc3d_addon.solver.tetmesh import Floats
 
 from .meshes import enclosed_volume, icosphere, twisted
@@ -96,18 +104,29 @@ def test_triangles_without_an_area_in_either_key_are_left_out() -> None:
     assert np.isfinite(deformation.turns).all()
 
 
-def test_fitted_rotations_find_the_rotation_of_positions() -> None:
+@given(st.integers(0, 2**32 - 1))
+def test_closest_tangents_are_the_polar_factor(seed: int) -> None:
+    vectors = np.random.default_rng(seed).normal(size=(2, 30, 3))
+    left, _, right = np.linalg.svd(vectors.transpose(1, 2, 0), full_matrices=False)
+    np.testing.assert_allclose(closest_tangents(vectors).transpose(1, 2, 0), left @ right, rtol=0.0, atol=1e-9)
+
+
+def test_closest_tangents_of_lines_and_points_are_finite() -> None:
+    line = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [1e-200, 0.0, 0.0]])
+    assert np.isfinite(closest_tangents(np.stack([line, -2.0 * line]))).all()
+
+
+def test_tangents_of_turned_positions_are_turned_tangents() -> None:
     turn = Rotation.random(random_state=1).as_matrix()
     deformation = TriangleDeformation.between(BALL, 1.5 * BALL, FACES)
-    targets = deformation.gradients @ deformation.stretch.at(0.3, "linear")
-    fitted = deformation.fitted_rotations(BALL @ turn.T, targets)
-    np.testing.assert_allclose(fitted, turn @ deformation.bases[:, :, :2], rtol=0.0, atol=1e-12)
+    gradients = (deformation.gradient_operator(len(BALL)) @ (BALL @ turn.T)).reshape(2, -1, 3)
+    fitted = closest_tangents(stretched(deformation.stretch.at(0.3, "linear"), gradients))
+    np.testing.assert_allclose(fitted, tangents_of(turn, deformation.bases), rtol=0.0, atol=1e-12)
 
 
-def test_the_load_of_its_own_gradients_is_in_balance_with_its_stiffness() -> None:
-    deformation = TriangleDeformation.between(BALL, BALL, FACES)
-    load = deformation.load(deformation.bases[:, :, :2], deformation.gradients, len(BALL))
-    energy = deformation.gradients @ deformation.gradients.transpose(0, 2, 1) * deformation.weights[:, None, None]
-    forces = np.zeros_like(BALL)
-    np.add.at(forces, FACES, energy @ BALL[FACES])
-    np.testing.assert_allclose(load, forces, rtol=0.0, atol=1e-12)
+def test_stretched_vectors_are_products() -> None:
+    vectors = np.random.default_rng(0).normal(size=(2, 8, 3))
+    stretch = np.random.default_rng(1).normal(size=(8, 2, 2))
+    stretch += stretch.transpose(0, 2, 1)
+    expected = np.einsum("mij,jmk->imk", stretch, vectors)
+    np.testing.assert_allclose(stretched(stretch, vectors), expected, rtol=0.0, atol=1e-14)

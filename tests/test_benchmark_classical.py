@@ -94,7 +94,7 @@ def test_winding_number_is_one_inside_and_zero_outside(bar: dict[str, np.ndarray
 
 def test_winding_number_is_exact_when_no_cell_is_far(bar: dict[str, np.ndarray]) -> None:
     inside = np.array([[0.5, 0.5, 2.0], [0.3, 0.6, 2.5]])
-    assert np.allclose(interior.winding_numbers(inside, bar["V0"], bar["faces"], cells=1), 1.0, atol=1e-12)
+    assert np.allclose(interior.winding_numbers(inside, bar["V0"], bar["faces"], sizes=(1,)), 1.0, atol=1e-12)
 
 
 def test_interior_tetrahedra_fill_a_bar_and_touch_every_vertex(bar: dict[str, np.ndarray]) -> None:

@@ -9,9 +9,10 @@ crosses itself or has slits is no obstacle, as it would be for a constrained tet
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
-from scipy.spatial.distance import cdist
 
 from .gradients import Floats, Ints
 
@@ -58,39 +59,77 @@ def interior_samples(positions: Floats, faces: Ints, seed: int = 0) -> Floats:
     return np.asarray(lattice[winding_numbers(lattice, positions, faces) > 0.5])
 
 
-def winding_numbers(queries: Floats, positions: Floats, faces: Ints, cells: int = 40) -> Floats:
+def winding_numbers(queries: Floats, positions: Floats, faces: Ints, sizes: tuple[int, ...] = (8, 32, 128)) -> Floats:
     """Generalised winding number (q,) of each query point.
 
     A. Jacobson, L. Kavan, O. Sorkine: Robust inside-outside segmentation using generalized winding numbers. 2013. The
-    triangles are gathered in the cells of a grid; a cell that is far away acts as one dipole (G. Barill et al.:
-    Fast winding numbers for soups and clouds. 2018), a near one triangle by triangle.
+    triangles are gathered in the cells of a coarse grid, those in the cells of finer ones (``sizes`` counts the
+    cells along the longest side); a cell that is far away acts as one dipole (G. Barill et al.: Fast winding
+    numbers for soups and clouds. 2018), a near one is opened.
     """
-    corners = positions[faces]
-    centres = corners.mean(axis=1)
-    normals = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    grid = np.floor((centres - centres.min(axis=0)) / (np.ptp(centres, axis=0).max() / cells)).astype(np.int64)
-    cell = np.unique(np.minimum(grid, cells - 1), axis=0, return_inverse=True)[1].ravel()
-    sizes = np.bincount(cell)
-    starts = np.cumsum(sizes) - sizes
-    members = np.argsort(cell, kind="stable")
-    middles = np.add.reduceat(centres[members], starts) / sizes[:, None]
-    dipoles = np.add.reduceat(normals[members], starts)
-    spread = np.linalg.norm(corners - middles[cell][:, None], axis=2).max(axis=1)
-    reach = np.maximum.reduceat(spread[members], starts)
+    levels = Level.nested(positions[faces], sizes)
     total = np.zeros(len(queries))
-    for part in np.array_split(np.arange(len(queries)), len(queries) * len(sizes) // 4_000_000 + 1):
-        distances = cdist(queries[part], middles)
-        near = distances < 2.5 * reach
-        flux = (middles * dipoles).sum(axis=1) - queries[part] @ dipoles.T
-        total[part] = np.where(near, 0.0, flux / np.where(near, 1.0, distances) ** 3).sum(axis=1)
-        query, close = np.nonzero(near)
-        count = sizes[close]
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        query = np.repeat(query, count)
-        triangle = members[np.repeat(starts[close], count) + within]
-        angles = solid_angles(corners[triangle] - queries[part][query, None])
+    for part in np.array_split(np.arange(len(queries)), len(queries) // 5000 + 1):
+        query = np.repeat(np.arange(len(part)), len(levels[0].reach))
+        member = np.tile(np.arange(len(levels[0].reach)), len(part))
+        for level in levels:
+            offset = level.middles[member] - queries[part][query]
+            distance = np.sqrt((offset * offset).sum(axis=1))
+            far = distance > 2.2 * level.reach[member]
+            flux = (offset[far] * level.dipoles[member[far]]).sum(axis=1) / distance[far] ** 3
+            total[part] += np.bincount(query[far], flux, len(part))
+            query, member = query[~far], member[~far]
+            count = level.counts[member]
+            within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+            query, member = np.repeat(query, count), level.members[np.repeat(level.starts[member], count) + within]
+        angles = solid_angles(positions[faces[member]] - queries[part][query, None])
         total[part] += np.bincount(query, angles, len(part))
     return total / (4.0 * np.pi)
+
+
+class Level(NamedTuple):
+    """Cells of triangles: the cells' middles, dipoles and reach, and what each of them opens into."""
+
+    middles: Floats
+    dipoles: Floats
+    reach: Floats
+    members: Ints
+    starts: Ints
+    counts: Ints
+
+    @classmethod
+    def nested(cls, corners: Floats, sizes: tuple[int, ...]) -> list[Level]:
+        """Levels from the coarsest to the finest, whose members are the triangles (m, 3, 3)."""
+        centres = corners.mean(axis=1)
+        normals = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        place = (centres - centres.min(axis=0)) / np.ptp(centres, axis=0).max()
+        parents = np.zeros(len(corners), dtype=np.int64)
+        labels = []
+        for size in sizes:
+            cell = np.minimum((place * size).astype(np.int64), size - 1) @ (1, size, size * size)
+            parents = np.unique(parents * size**3 + cell, return_inverse=True)[1].ravel()
+            labels.append(parents)
+        levels = []
+        for depth, label in enumerate(labels):
+            finer = labels[depth + 1] if depth + 1 < len(labels) else np.arange(len(corners))
+            first = np.unique(finer, return_index=True)[1]
+            counts = np.bincount(label[first])
+            triangles = np.bincount(label)
+            order = np.argsort(label, kind="stable")
+            starts = np.cumsum(triangles) - triangles
+            middles = np.add.reduceat(centres[order], starts) / triangles[:, None]
+            spread = np.linalg.norm(corners - middles[label][:, None], axis=2).max(axis=1)
+            levels.append(
+                cls(
+                    middles,
+                    np.add.reduceat(normals[order], starts),
+                    np.maximum.reduceat(spread[order], starts),
+                    np.argsort(label[first], kind="stable"),
+                    np.cumsum(counts) - counts,
+                    counts,
+                )
+            )
+        return levels
 
 
 def solid_angles(corners: Floats) -> Floats:

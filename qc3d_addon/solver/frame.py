@@ -30,6 +30,8 @@ class Frame:
         Tetrahedra that are not kept positively oriented.
     repaired : bool
         Whether folds of the predicted map had to be removed.
+    crossings : int
+        Pairs of triangles that cross beyond what the worse of the two keys has.
     """
 
     positions: Floats
@@ -37,16 +39,19 @@ class Frame:
     place: Floats
     folds: int
     repaired: bool
+    crossings: int
 
     @classmethod
-    def of(cls, prepared: PreparedMap, positions: Floats, values: Floats, time: float, repaired: bool) -> Frame:
+    def of(
+        cls, prepared: PreparedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int
+    ) -> Frame:
         """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube."""
         determinant = determinants(prepared.mesh.jacobians(values))
         worst = int(np.argmin(determinant))
         embedding = prepared.embedding
         place = embedding.from_cube(values[prepared.mesh.tets[worst]].mean(axis=0)[None], time)[0]
         folds = int((determinant <= 0.0).sum())
-        return cls(positions, float(determinant[worst]), place, folds, repaired)
+        return cls(positions, float(determinant[worst]), place, folds, repaired, crossings)
 
     def certificate(self, time: float) -> dict[str, Any]:
         """Plain values for the report."""

@@ -13,6 +13,7 @@ from .prepared import PreparedMap
 from .reconstruction import Reconstructor
 from .representation import polar_decomposition
 from .tetmesh import Floats, TetMesh
+from .uncrossing import CrossingLimit
 
 
 class LinearMaps:
@@ -46,6 +47,7 @@ class LinearFrames:
     def __init__(self, prepared: PreparedMap) -> None:
         self._prepared = prepared
         self._maps = LinearMaps(prepared.mesh, prepared.mapped)
+        self._limit = CrossingLimit(prepared.pair.faces, prepared.pair.key0, prepared.pair.key1)
         self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
 
     def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
@@ -60,5 +62,5 @@ class LinearFrames:
             )
             # A part that both keys leave in place must not breathe with the map around it.
             positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
-            made.append(Frame.of(self._prepared, positions, values, time, repaired=False))
+            made.append(Frame.of(self._prepared, positions, values, time, False, self._limit.excess(positions)))
         return made

@@ -8,26 +8,23 @@ import copy
 from collections.abc import Generator
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
 from scipy.spatial import cKDTree
 
 from .branches import Turning, swing_beside
-from .crossings import crossing_pairs
 from .frame import Frame
 from .prepared import PreparedMap
 from .rates import Rates, hermite
 from .stretch import StretchLaw
 from .surface_path import SurfacePath
 from .tetmesh import Bools, Floats, Ints
-from .topology import sides
+from .uncrossing import CrossingLimit
 from .volume_path import VolumePath
 from .winding import winding_numbers
 
 _REPAIR_ITERATIONS = 15
-_UNCROSSING_ROUNDS = 3
-# Around a crossing the anchors of the volume win; their influence fades over so many rings of neighbours.
+_UNCROSSING_ATTEMPTS = 3
+# How many times as strongly the surface is drawn to the volume's anchors at a crossing.
 _STRONGEST_ANCHOR = 1e5
-_FADING_RINGS = 4
 
 
 class NaturalFrames:
@@ -48,6 +45,7 @@ class NaturalFrames:
         self._surface = SurfacePath(embedding, law, prepared.extra_turns)
         turning = _turning_inside(prepared, self._surface)
         self._volume = VolumePath(mesh, prepared.mapped, turning, inside, law)
+        self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1)
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
             key - prepared.landmarks @ self._volume.at(time)
@@ -111,15 +109,16 @@ class NaturalFrames:
         """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
         volumes, positions = [], []
         for index, time in enumerate(times.tolist()):
-            yield 0.9 * index / len(times)
+            yield index / len(times)
             volumes.append(self._volume.at(time))
             positions.append(self._surface.positions(time, self._anchor(volumes[-1], time)))
-        yield from self._uncrossed(times, volumes, positions)
+        positions = yield from self._uncrossed(times, volumes, positions)
         made = []
         for time, values, shape in zip(times.tolist(), volumes, positions, strict=True):
             folded = self._prepared.folds(values) > 0
             unfolded = self._unfolded(values, time) if folded else values
-            made.append(Frame.of(self._prepared, self._placed(shape, time), unfolded, time, folded))
+            crossings = self._limit.excess(shape)
+            made.append(Frame.of(self._prepared, self._placed(shape, time), unfolded, time, folded, crossings))
         return made
 
     def _placed(self, shape: Floats, time: float) -> Floats:
@@ -141,39 +140,28 @@ class NaturalFrames:
         nearest = maps[round(time * (len(maps) - 1))]
         return self._prepared.fitter.fit(nearest, self._prepared.landmarks @ values, _REPAIR_ITERATIONS)
 
-    def _uncrossed(self, times: Floats, volumes: list[Floats], positions: list[Floats]) -> Generator[float, None, None]:
-        """Where a frame crosses itself more than the keys do, let the volume's anchors win, and solve all again."""
-        pair, embedding = self._prepared.pair, self._prepared.embedding
-        count = len(pair.faces)
-        in_keys = [_pair_codes(crossing_pairs(key, pair.faces), count) for key in (embedding.key0, embedding.key1)]
-        allowed = max(len(codes) for codes in in_keys)
-        factors = np.ones(len(pair.key0))
-        for round_ in range(_UNCROSSING_ROUNDS):
-            yield 0.9 + 0.1 * round_ / _UNCROSSING_ROUNDS
-            new = np.zeros(len(pair.key0), dtype=bool)
+    def _uncrossed(
+        self, times: Floats, volumes: list[Floats], positions: list[Floats]
+    ) -> Generator[float, None, list[Floats]]:
+        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps."""
+        excess = sum(self._limit.excess(shape) for shape in positions)
+        reach = np.zeros(len(self.still))
+        for attempt in range(_UNCROSSING_ATTEMPTS):
+            if not excess:
+                break
+            yield attempt / _UNCROSSING_ATTEMPTS
             for shape in positions:
-                crossing = crossing_pairs(shape, pair.faces)
-                if len(crossing) > allowed:
-                    fresh = ~np.isin(_pair_codes(crossing, count), np.concatenate(in_keys))
-                    new[pair.faces[crossing[fresh]].ravel()] = True
-            if not new.any():
-                return
-            factors = np.maximum(factors, self._faded(new))
-            surface = self._surface.with_stronger_anchors(factors)
-            for index, time in enumerate(times.tolist()):
-                positions[index] = surface.positions(time, self._anchor(volumes[index], time))
-
-    def _faded(self, chosen: Bools) -> Floats:
-        """(n,) factors from the strongest at the chosen vertices to 1 a few rings away."""
-        edges = sides(self._prepared.pair.faces)
-        count = len(chosen)
-        ring: csr_array = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
-        reach = chosen.astype(np.float64)
-        level = reach.copy()
-        for _ in range(_FADING_RINGS):
-            reach = np.minimum(reach + ring @ reach + ring.T @ reach, 1.0)
-            level += reach
-        return np.asarray(_STRONGEST_ANCHOR ** (level / (_FADING_RINGS + 1)))
+                reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
+            surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
+            tried = [
+                surface.positions(time, self._anchor(values, time))
+                for time, values in zip(times.tolist(), volumes, strict=True)
+            ]
+            remaining = sum(self._limit.excess(shape) for shape in tried)
+            if remaining >= excess:
+                break
+            positions, excess = tried, remaining
+        return positions
 
 
 def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:
@@ -186,7 +174,3 @@ def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:
     twists = twist[nearest].any(axis=1)
     swing = np.where(twists[:, None], swing_beside(prepared.turns, twist[nearest]), prepared.turns)
     return Turning(swing, twist[nearest])
-
-
-def _pair_codes(pairs: Ints, count: int) -> Ints:
-    return np.asarray(pairs[:, 0] * count + pairs[:, 1])

@@ -194,6 +194,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
             "map": sum(part.folds(part.mapped) for part in prepared),
             "frames": [made[index].folds for index in range(len(wanted))],
         },
+        "crossings": [made[index].crossings for index in range(len(wanted))],
         "certificates": [made[index].certificate(time) for index, time in enumerate(wanted.tolist())],
         "residual": {name: max(residual[name] for residual in residuals) for name in ("rms", "max")},
         "key_error": key_error,

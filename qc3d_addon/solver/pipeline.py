@@ -181,6 +181,12 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
             key_error = max(key_error, error / prepared[number].pair.diagonal)
     yield Progress("frames", 1.0)
     notes = [note for part in prepared for note in part.notes] + [note for maker in makers for note in maker.notes]
+    crossings = [made[index].crossings for index in range(len(wanted))]
+    if any(crossings):
+        worst = int(np.argmax(crossings))
+        notes.append(
+            f"The frame at {wanted[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than the keys."
+        )
     residuals = [part.landmark_residual() for part in prepared]
     report = {
         "engine": ", ".join(dict.fromkeys(part.engine for part in prepared)),
@@ -194,7 +200,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
             "map": sum(part.folds(part.mapped) for part in prepared),
             "frames": [made[index].folds for index in range(len(wanted))],
         },
-        "crossings": [made[index].crossings for index in range(len(wanted))],
+        "crossings": crossings,
         "certificates": [made[index].certificate(time) for index, time in enumerate(wanted.tolist())],
         "residual": {name: max(residual[name] for residual in residuals) for name in ("rms", "max")},
         "key_error": key_error,

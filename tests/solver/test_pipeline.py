@@ -226,7 +226,6 @@ class TestEngines:
             made = finish(inbetweens(prepared, [0.0, 0.4, 1.0], replace(DRAFT, mode=mode)))
             np.testing.assert_array_equal(made.frames, np.broadcast_to(BAR, made.frames.shape))
 
-    @pytest.mark.xfail(reason="the mean area of no triangle at all", strict=True)
     @pytest.mark.parametrize("mode", MODES)
     @pytest.mark.filterwarnings("error")
     def test_points_without_faces(self, mode: Mode) -> None:

@@ -185,7 +185,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
     if any(crossings):
         worst = int(np.argmax(crossings))
         notes.append(
-            f"The frame at {wanted[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than the keys."
+            f"The frame at {wanted[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than a key."
         )
     residuals = [part.landmark_residual() for part in prepared]
     report = {

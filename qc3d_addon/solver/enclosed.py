@@ -25,6 +25,8 @@ class ClosedComponents:
     def __init__(self, faces: Ints, labels: Ints) -> None:
         self._faces = faces[closed_faces(faces, labels)]
         self._labels = labels
+        # Seen from a vertex of its own, a tiny component far away has its volume to rounding.
+        self._views: Ints = np.unique(labels, return_index=True)[1].astype(np.int64)
 
     @property
     def empty(self) -> bool:
@@ -33,7 +35,8 @@ class ClosedComponents:
 
     def volumes(self, positions: Floats) -> Floats:
         """(components,) signed enclosed volumes."""
-        first, second, third = (positions[self._faces[:, corner]] for corner in range(3))
+        view = positions[self._views[self._labels[self._faces[:, 0]]]]
+        first, second, third = (positions[self._faces[:, corner]] - view for corner in range(3))
         shares = np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0
         return self._summed(self._faces[:, 0], shares)
 

@@ -147,7 +147,6 @@ class SurfacePath:
             + StiffnessPattern(self._springs, count).assemble(spring)
             + diags_array(self._anchor_weights)
         )
-        self._held_columns = matrix[free][:, ~free]
         # The matrix is symmetric positive definite, so the pivots may stay on the diagonal.
         self._factored = splu(
             csc_array(matrix[free][:, free]),
@@ -181,19 +180,21 @@ class SurfacePath:
         return self._solved(anchor, closest_tangents(stretched(stretch, gradients)), stretch, positions, time)
 
     def _solved(self, anchor: Floats, tangents: Floats, stretch: Floats, previous: Floats, time: float) -> Floats:
-        load = self._divergence @ stretched(stretch, tangents).reshape(-1, 3)
-        load += self._anchor_weights[:, None] * anchor + self._spring_load(previous, time)
         positions = self._key0 + time * self._travel
-        load = load[self._free] - self._held_columns @ positions[~self._free]
-        positions[self._free] = self._factored.solve(load)
+        positions[self._free] = previous[self._free]
+        # Solved for the change: where the previous positions are right, needles and tiny parts do not spoil them.
+        missing = stretched(stretch, tangents).reshape(-1, 3) - self._gradient @ positions
+        load = self._divergence @ missing + self._anchor_weights[:, None] * (anchor - positions)
+        load += self._spring_load(positions, time)
+        positions[self._free] += self._factored.solve(load[self._free])
         return self._with_volume(positions, time, 1)
 
     def _spring_load(self, positions: Floats, time: float) -> Floats:
-        """(n, 3) forces of edges without triangles: their present direction at the interpolated length."""
+        """(n, 3) forces of edges without triangles towards the interpolated length in their present direction."""
         spans = _spans(positions, self._springs)
         present = np.linalg.norm(spans, axis=1)
         wanted = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
-        spans *= np.where(present > 1e-12, wanted / np.maximum(present, 1e-12), 0.0)[:, None]
+        spans *= np.where(present > 1e-12, wanted / np.maximum(present, 1e-12) - 1.0, -1.0)[:, None]
         return scatter(self._springs, np.stack([-spans, spans], axis=1), len(positions))
 
     def _with_volume(self, positions: Floats, time: float, steps: int) -> Floats:

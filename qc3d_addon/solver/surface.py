@@ -108,8 +108,11 @@ def closest_tangents(vectors: Floats) -> Floats:
     one, two = (np.einsum("mi,mi->m", vector, vector) for vector in vectors)
     mixed = np.einsum("mi,mi->m", first, second)
     trace = one + two
-    # A triangle that is a line for a moment still gets two directions; the floor is far below any real triangle.
-    root = np.sqrt(np.maximum(one * two - mixed**2, (_THINNEST * trace) ** 2))
+    # From the cross product: one * two - mixed**2 loses a triangle flattened by 1e-4 to rounding. One that is a line
+    # for a moment still gets two directions; the floor is far below any real triangle.
+    (x, y, z), (u, v, w) = first.T, second.T
+    root = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
+    root = np.maximum(root, _THINNEST * trace)
     scale = 1.0 / np.maximum(root * np.sqrt(trace + 2.0 * root), 1e-300)
     across = (scale * mixed)[:, None]
     return np.stack(

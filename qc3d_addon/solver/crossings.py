@@ -79,9 +79,14 @@ def _candidates(low: Floats, high: Floats) -> list[tuple[Ints, Ints]]:
 
 def _near_and_apart(low: Floats, high: Floats, faces: Ints, first: Ints, second: Ints) -> Bools:
     """Whether bounding boxes overlap and no vertex is shared."""
-    near = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
-    shared = (faces[first][:, :, None] == faces[second][:, None, :]).any(axis=(1, 2))
-    return np.asarray(near & ~shared)
+    kept = np.ones(len(first), dtype=bool)
+    for axis in range(3):
+        kept &= (low[first, axis] <= high[second, axis]) & (low[second, axis] <= high[first, axis])
+    near = np.flatnonzero(kept)
+    corners, others = faces[first[near]], faces[second[near]]
+    for corner in range(3):
+        kept[near] &= (corners[:, corner, None] != others).all(axis=1)
+    return kept
 
 
 def _cross(first: Floats, second: Floats) -> Bools:

@@ -112,13 +112,14 @@ class NaturalFrames:
             yield index / len(times)
             volumes.append(self._volume.at(time))
             positions.append(self._surface.positions(time, self._anchor(volumes[-1], time)))
-        positions = yield from self._uncrossed(times, volumes, positions)
+        positions, crossings = yield from self._uncrossed(times, volumes, positions)
         made = []
-        for time, values, shape in zip(times.tolist(), volumes, positions, strict=True):
+        for index, time in enumerate(times.tolist()):
+            values = volumes[index]
             folded = self._prepared.folds(values) > 0
             unfolded = self._unfolded(values, time) if folded else values
-            crossings = self._limit.excess(shape)
-            made.append(Frame.of(self._prepared, self._placed(shape, time), unfolded, time, folded, crossings))
+            shape = self._placed(positions[index], time)
+            made.append(Frame.of(self._prepared, shape, unfolded, time, folded, crossings[index]))
         return made
 
     def _placed(self, shape: Floats, time: float) -> Floats:
@@ -142,12 +143,15 @@ class NaturalFrames:
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats]
-    ) -> Generator[float, None, list[Floats]]:
-        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps."""
-        excess = sum(self._limit.excess(shape) for shape in positions)
+    ) -> Generator[float, None, tuple[list[Floats], list[int]]]:
+        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps.
+
+        Returns the positions and what is left of the excess of crossings in each frame.
+        """
+        excess = [self._limit.excess(shape) for shape in positions]
         reach = np.zeros(len(self.still))
         for attempt in range(_UNCROSSING_ATTEMPTS):
-            if not excess:
+            if not any(excess):
                 break
             yield attempt / _UNCROSSING_ATTEMPTS
             for shape in positions:
@@ -157,11 +161,11 @@ class NaturalFrames:
                 surface.positions(time, self._anchor(values, time))
                 for time, values in zip(times.tolist(), volumes, strict=True)
             ]
-            remaining = sum(self._limit.excess(shape) for shape in tried)
-            if remaining >= excess:
+            remaining = [self._limit.excess(shape) for shape in tried]
+            if sum(remaining) >= sum(excess):
                 break
             positions, excess = tried, remaining
-        return positions
+        return positions, excess
 
 
 def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .embedding import RigidMotion
+from .rotations import rotation_matrices
+from .screws import best_turns, translation_factors
 from .tetmesh import Bools, Floats, Ints
 
 
@@ -22,25 +23,43 @@ class ScrewAnchors:
     weights : (n,)
         Positive weights of the vertices in the fit of the screws.
     labels : (n,) int64
-        Component of every vertex.
+        Component of every vertex, 0, 1, 2 and so on.
     """
 
     def __init__(self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints) -> None:
         self._key0 = key0
-        self._parts: list[tuple[Ints, RigidMotion]] = []
-        order = np.argsort(labels, kind="stable")
-        starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
-        for members in np.split(order, starts[1:]):
-            if len(members) >= 3 and not still[members].any():
-                self._parts.append((members, RigidMotion.between(key0[members], key1[members], weights[members])))
+        moves = np.bincount(labels) >= 3
+        moves[labels[still]] = False
+        self._members = np.flatnonzero(moves[labels])
+        parts = np.unique(labels[self._members], return_inverse=True)[1].ravel()
+        source, target = key0[self._members], key1[self._members]
+        weight = weights[self._members]
+        weight = weight / np.bincount(parts, weights=weight)[parts]
+        centres = [_summed(parts, weight[:, None] * points) for points in (source, target)]
+        spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
+        products = weight[:, None, None] * spread[1][:, :, None] * spread[0][:, None, :]
+        self._turns = best_turns(_summed(parts, products.reshape(-1, 9)).reshape(-1, 3, 3))
+        rotations = rotation_matrices(self._turns)
+        shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
+        self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]
+        self._parts: Ints = parts.astype(np.int64)
         self._missing = key1 - self._moved(1.0)
 
     def _moved(self, time: float) -> Floats:
+        turns = time * self._turns
+        rotations = rotation_matrices(turns)
+        shifts = np.einsum("kij,kj->ki", translation_factors(turns), time * self._velocities)
         moved = self._key0.copy()
-        for members, motion in self._parts:
-            moved[members] = motion.apply(self._key0[members], time)
+        moved[self._members] = (
+            np.einsum("nij,nj->ni", rotations[self._parts], self._key0[self._members]) + shifts[self._parts]
+        )
         return moved
 
     def positions(self, time: float) -> Floats:
         """(n, 3) anchors at ``time``; the keys at 0 and 1."""
         return self._moved(time) + time * self._missing
+
+
+def _summed(parts: Ints, values: Floats) -> Floats:
+    """(parts, c) sums of the rows of ``values`` (n, c) that belong to each part."""
+    return np.stack([np.bincount(parts, weights=column) for column in values.T], axis=1)

@@ -10,13 +10,12 @@ from functools import cached_property
 import numpy as np
 
 from .keypair import KeyPair
-from .rotations import closest_rotations, rotation_matrices, rotation_vectors
+from .rotations import rotation_matrices
+from .screws import best_turns, translation_factors
 from .tetmesh import Bools, Floats, Ints
 
 STILL_TOLERANCE = 1e-6
 MARGIN = 0.17
-# Covariances whose second singular value is below this part of the first belong to points in a line.
-_LINE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +47,9 @@ class RigidMotion:
         weights = weights / weights.sum()
         source_centre, target_centre = weights @ source, weights @ target
         covariance = (target - target_centre).T @ (weights[:, None] * (source - source_centre))
-        turn = _turn_of_line(covariance)
-        if turn is None:
-            turn = rotation_vectors(closest_rotations(covariance[None]))[0]
+        turn = best_turns(covariance[None])[0]
         shift = target_centre - rotation_matrices(turn[None])[0] @ source_centre
-        return cls(turn, np.linalg.solve(_translation_factor(turn), shift))
+        return cls(turn, np.linalg.solve(translation_factors(turn[None])[0], shift))
 
     @property
     def rotation(self) -> Floats:
@@ -63,34 +60,11 @@ class RigidMotion:
         """Move points (n, 3) along the screw up to ``time`` (0 = not at all, 1 = all the way)."""
         turn = time * self.turn
         rotation = rotation_matrices(turn[None])[0]
-        return np.asarray(points @ rotation.T + _translation_factor(turn) @ (time * self.velocity))
+        return np.asarray(points @ rotation.T + translation_factors(turn[None])[0] @ (time * self.velocity))
 
     def undo(self, points: Floats) -> Floats:
         """Move points (n, 3) back along the whole screw."""
         return self.apply(points, -1.0)
-
-
-def _turn_of_line(covariance: Floats) -> Floats | None:
-    """Shortest rotation vector between two directions for a covariance of rank 1, which leaves the spin free."""
-    left, sizes, right = np.linalg.svd(covariance)
-    if sizes[1] > _LINE * sizes[0]:
-        return None
-    source, target = right[0], left[:, 0]
-    axis, cosine = np.cross(source, target), float(source @ target)
-    sine = float(np.linalg.norm(axis))
-    # Opposite directions: half a turn about anything across the line.
-    axis = right[1] if sine < _LINE else axis / sine
-    return np.asarray(np.arctan2(sine, cosine) * axis)
-
-
-def _translation_factor(turn: Floats) -> Floats:
-    """The matrix V(q) with b = V(q) v for the twist (q, v): the integral of exp(s [q]x) over s in 0..1."""
-    angle = float(np.linalg.norm(turn))
-    cross = np.array([[0.0, -turn[2], turn[1]], [turn[2], 0.0, -turn[0]], [-turn[1], turn[0], 0.0]])
-    # (1 - cos a) / a^2 without its cancellation.
-    first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    second = 1.0 / 6.0 - angle**2 / 120.0 if angle < 1e-4 else (angle - np.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,5 @@ class MeshingError(QC3DError):
     """The cube could not be filled with tetrahedra."""
 
 
-class FitError(QC3DError):
-    """No fold-free map that carries the first key onto the second was found."""
-
-
 class ReconstructionError(QC3DError):
     """A map cannot be rebuilt from its representation and boundary conditions."""

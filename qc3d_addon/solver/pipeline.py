@@ -7,7 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -33,6 +33,9 @@ from .surface_path import SurfacePath
 from .tetmesh import Floats, Ints
 
 T = TypeVar("T")
+
+# Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
+_LARGE_RESIDUAL = 0.03
 
 
 class Progress(NamedTuple):
@@ -96,8 +99,11 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     ------
     MeshingError
         If the engine asked for cannot fill the cube.
-    FitError
-        If no map without folds was found.
+
+    Notes
+    -----
+    A key that no map without folds can reach, such as a mirrored one, is no error: the map stays as near as it can, a
+    note says so, and the surface meets both keys all the same.
     """
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
@@ -114,16 +120,25 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
         path = SurfacePath(embedding, settings.stretch, settings.extra_turns)
         followed = yield from _staged("fit", follow_path(fitter, path, embedding.key1))
     yield Progress("fit", 1.0)
-    return PreparedMap(
+    prepared = PreparedMap(
         pair,
         filled.mesh,
         followed.maps,
         followed.turns,
         settings.extra_turns,
         filled.engine,
+        settings.quality,
         filled.notes,
         seconds,
     )
+    missed = prepared.landmark_residual()["rms"]
+    if missed <= _LARGE_RESIDUAL:
+        return prepared
+    note = (
+        f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
+        "cannot be reached without folds, and its in-betweens are no better than a straight blend."
+    )
+    return replace(prepared, notes=(*filled.notes, note))
 
 
 def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> Steps[Bake]:
@@ -154,7 +169,10 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
     InputError
         If a time is outside 0..1 or the pairs are not consecutive.
     """
-    wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    try:
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    except (TypeError, ValueError) as reason:
+        raise InputError("The times of the frames must be numbers.") from reason
     if wanted.ndim != 1 or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
         raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (last key).")
     for left, right in pairwise(prepared):
@@ -193,7 +211,7 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         "mode": settings.mode,
         "stretch": settings.stretch,
         "easing": settings.easing,
-        "quality": settings.quality,
+        "quality": prepared[0].quality,
         "vertices": len(prepared[0].pair.key0),
         "tetrahedra": sum(len(part.mesh.tets) for part in prepared),
         "folds": {

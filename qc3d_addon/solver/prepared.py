@@ -36,6 +36,8 @@ class PreparedMap:
         The setting that the way was found with.
     engine : str
         The engine that made the mesh.
+    quality : str
+        How fine the mesh is.
     notes : tuple of str
         Sentences for the user, such as why another engine ran.
     seconds : dict
@@ -48,6 +50,7 @@ class PreparedMap:
     turns: Floats
     extra_turns: int
     engine: str
+    quality: str
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 

@@ -42,6 +42,7 @@ def to_bytes(prepared: PreparedMap) -> bytes:
         "fingerprint": fingerprint(prepared.pair),
         "extra_turns": prepared.extra_turns,
         "engine": prepared.engine,
+        "quality": prepared.quality,
         "notes": list(prepared.notes),
     }
     buffer = io.BytesIO()
@@ -72,7 +73,8 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
             header = json.loads(bytes(stored["header"]))
             version, owner = header["version"], header["fingerprint"]
             extra_turns = int(header["extra_turns"])
-            engine, notes = str(header["engine"]), tuple(str(note) for note in header["notes"])
+            engine, quality = str(header["engine"]), str(header["quality"])
+            notes = tuple(str(note) for note in header["notes"])
             points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
             tets = np.asarray(stored["tets"], dtype=np.int64)
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
@@ -93,4 +95,4 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
     # Jacobians can be computed only where no volume is zero.
     if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
-    return PreparedMap(pair, mesh, maps, turns, extra_turns, engine, notes)
+    return PreparedMap(pair, mesh, maps, turns, extra_turns, engine, quality, notes)

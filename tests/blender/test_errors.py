@@ -15,7 +15,7 @@ import pytest
 
 from qc3d_addon.blender import shape_keys, slider
 from qc3d_addon.solver import pipeline
-from qc3d_addon.solver.errors import FitError
+from qc3d_addon.solver.errors import MeshingError
 
 State = Callable[[], dict[str, object]]
 OPERATORS = [bpy.ops.qc3d.bake_inbetweens, bpy.ops.qc3d.prepare]
@@ -226,7 +226,7 @@ class TestLaterFailures:
     ) -> None:
         def prepare(*arguments: object) -> Iterator[pipeline.Progress]:
             yield pipeline.Progress("fit", 0.5)
-            raise FitError("No map without folds was found; try a finer quality.")
+            raise MeshingError("No map without folds was found; try a finer quality.")
 
         monkeypatch.setattr(pipeline, "prepare", prepare)
         before = state()
@@ -283,7 +283,7 @@ class TestLaterFailures:
         def failing(*arguments: object) -> object:
             calls.append(arguments)
             if len(calls) == call:
-                raise FitError("The disk is on fire.")
+                raise MeshingError("The disk is on fire.")
             return original(*arguments)
 
         monkeypatch.setattr(module, function, failing)

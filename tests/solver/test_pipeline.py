@@ -67,7 +67,7 @@ class TestPreparedMap:
         mesh = kuhn_grid(2)
         pair = KeyPair.checked(points, points, faces)
         maps = np.stack([mesh.points, mesh.points])
-        prepared = PreparedMap(pair, mesh, maps, np.zeros((len(mesh.tets), 3)), 0, "delaunay")
+        prepared = PreparedMap(pair, mesh, maps, np.zeros((len(mesh.tets), 3)), 0, "delaunay", "draft")
         values = mesh.points.copy()
         values[13] += [0.9, 0.0, 0.0]
         assert prepared.folds(values) == np.count_nonzero(np.linalg.det(mesh.jacobians(values)) <= 0.0) > 0
@@ -234,3 +234,18 @@ class TestEngines:
         made = finish(inbetweens(prepared, [0.0, 0.5, 1.0], replace(DRAFT, mode=mode)))
         assert made.report["key_error"] < 1e-9
         assert np.isfinite(made.frames).all()
+
+
+def test_times_that_are_no_numbers_are_refused() -> None:
+    with pytest.raises(InputError, match="numbers"):
+        finish(inbetweens(prepared_once("bending and moving"), ["soon"], DRAFT))
+
+
+def test_a_mirrored_key_is_met_and_a_note_says_what_that_is_worth() -> None:
+    pair = KeyPair.checked(BAR, BAR * [-1.0, 1.0, 1.0], FACES)
+    prepared = finish(prepare(pair, DRAFT))
+    bake = finish(inbetweens(prepared, [0.0, 0.5, 1.0], DRAFT))
+    assert any("mirrored" in note for note in bake.report["notes"])
+    assert bake.report["folds"] == {"map": 0, "frames": [0, 0, 0]}
+    np.testing.assert_array_equal(bake.frames[2], pair.key1)
+    assert np.isfinite(bake.frames).all()

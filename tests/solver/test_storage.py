@@ -31,7 +31,9 @@ def prepared() -> PreparedMap:
     half, full = (sine_map(mesh.points, np.full((1, 3), size), np.ones((1, 3, 3))) for size in (0.03, 0.06))
     maps = np.stack([mesh.points, half, full])
     turns = np.random.default_rng(0).normal(size=(len(mesh.tets), 3))
-    return PreparedMap(PAIR, mesh, maps, turns, 2, "delaunay", ("Ein Satz für dich – „so“.", "Two."), {"mesh": 1.0})
+    return PreparedMap(
+        PAIR, mesh, maps, turns, 2, "delaunay", "fine", ("Ein Satz für dich – „so“.", "Two."), {"mesh": 1.0}
+    )
 
 
 STORED = to_bytes(prepared())

@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .tetmesh import Bools, Floats, Ints
 
-# Cells of the search grid are widened until a triangle lies in so many of them on average.
-_MOST_CELLS_EACH = 8
+# Triangles are searched for by size: those of one level are up to so many times smaller than those of the last.
+_LEVEL_RATIO = 3.0
+# Cells of all smaller triangles are this fine: their numbers along three axes still fit into one integer.
+_FINEST_LEVEL = 12
 _CHUNK = 2_000_000
 
 
@@ -39,42 +43,54 @@ def crossing_pairs(points: Floats, faces: Ints) -> Ints:
     return np.stack([unique // len(faces), unique % len(faces)], axis=1)
 
 
-def _candidates(low: Floats, high: Floats) -> list[tuple[Ints, Ints]]:
-    """Pairs that share a cell of a uniform grid, each with the smaller index first, in chunks."""
-    cell = max(float((high - low).max(axis=1).mean()), 1e-300)
-    origin = low.min(axis=0)
-    while True:
-        first_cell, last_cell = (np.floor((bound - origin) / cell).astype(np.int64) for bound in (low, high))
-        spans = last_cell - first_cell + 1
-        counts = spans.prod(axis=1)
-        if counts.sum() <= _MOST_CELLS_EACH * len(low):
-            break
-        cell *= 1.5
+def _candidates(low: Floats, high: Floats) -> Iterator[tuple[Ints, Ints]]:
+    """Pairs of boxes that share a cell of a grid, the smaller index first, in chunks.
+
+    There is a grid for each level of size. Its cells are as large as its boxes, which meet each other and all smaller
+    ones there: a few huge triangles among many tiny ones cost no more than their number.
+    """
+    sizes, origin = (high - low).max(axis=1), low.min(axis=0)
+    extent = float((high - origin).max())
+    if extent == 0.0:
+        return
+    parts = np.maximum(sizes / extent, _LEVEL_RATIO**-_FINEST_LEVEL)
+    levels = np.floor(-np.log(parts) / np.log(_LEVEL_RATIO)).astype(np.int64)
+    for level in np.unique(levels):
+        members = np.flatnonzero(levels >= level)
+        cell = extent / _LEVEL_RATIO**level
+        owner, code = _covered_cells(low[members] - origin, high[members] - origin, cell)
+        smaller = levels[members[owner]] > level
+        order = np.lexsort((smaller, code))
+        owner, code, smaller = members[owner[order]], code[order], smaller[order]
+        # Every entry of the level meets the later entries of its cell, the smaller ones after those of the level.
+        ends = np.searchsorted(code, code, side="right")
+        partners = np.where(smaller, 0, ends - np.arange(len(code)) - 1)
+        totals = np.cumsum(partners)
+        begin = 0
+        while begin < len(code) and totals[-1] > totals[begin] - partners[begin]:
+            done = totals[begin] - partners[begin]
+            end = max(int(np.searchsorted(totals, done + _CHUNK, side="right")), begin + 1)
+            repeats = partners[begin:end]
+            left = np.repeat(np.arange(begin, end), repeats)
+            right = left + 1 + np.arange(len(left)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+            first, second = owner[left], owner[right]
+            yield np.minimum(first, second), np.maximum(first, second)
+            begin = end
+
+
+def _covered_cells(low: Floats, high: Floats, cell: float) -> tuple[Ints, Ints]:
+    """The cells that boxes, measured from the grid's corner, lie in: numbers of the boxes, and of their cells."""
+    first, last = (np.floor(bound / cell).astype(np.int64) for bound in (low, high))
+    spans = last - first + 1
+    counts = spans.prod(axis=1)
     owner = np.repeat(np.arange(len(low)), counts)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    span = spans[owner]
-    place = first_cell[owner]
+    span, place = spans[owner], first[owner]
     place[:, 0] += within // (span[:, 1] * span[:, 2])
     place[:, 1] += within // span[:, 2] % span[:, 1]
     place[:, 2] += within % span[:, 2]
-    size = last_cell.max(axis=0) + 1
-    code = (place[:, 0] * size[1] + place[:, 1]) * size[2] + place[:, 2]
-    order = np.lexsort((owner, code))
-    owner, code = owner[order], code[order]
-    # Every entry of a cell meets the later entries of that cell.
-    ends = np.searchsorted(code, code, side="right")
-    later = ends - np.arange(len(code)) - 1
-    borders = np.searchsorted(np.cumsum(later), np.arange(_CHUNK, int(later.sum()) + _CHUNK, _CHUNK))
-    chunks = []
-    begin = 0
-    for end in np.minimum(borders + 1, len(code)):
-        entries = np.arange(begin, end)
-        repeats = later[entries]
-        left = np.repeat(entries, repeats)
-        offsets = np.arange(len(left)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        chunks.append((owner[left], owner[left + 1 + offsets]))
-        begin = end
-    return chunks
+    size = last.max(axis=0) + 1
+    return owner, (place[:, 0] * size[1] + place[:, 1]) * size[2] + place[:, 2]
 
 
 def _near_and_apart(low: Floats, high: Floats, faces: Ints, first: Ints, second: Ints) -> Bools:

@@ -16,6 +16,7 @@ from typing import NoReturn, get_args
 
 from .progress_bars import StageBars
 from .solver.array_files import read_pair, replacing, write_frames
+from .solver.easing import Easing
 from .solver.errors import InputError, QC3DError
 from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
 from .solver.settings import Engine, Mode, Quality, Settings
@@ -88,7 +89,7 @@ def _print_notes(notes: Iterable[str]) -> None:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    names = ("mode", "stretch", "extra_turns", "engine", "quality", "seed")
+    names = ("mode", "stretch", "easing", "extra_turns", "engine", "quality", "seed")
     return Settings(**{name: getattr(arguments, name) for name in names})
 
 
@@ -140,6 +141,7 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
     for name, choices, text in (
         ("mode", get_args(Mode), "how in-betweens are made"),
         ("stretch", get_args(StretchLaw), "how mode natural interpolates stretches"),
+        ("easing", get_args(Easing), "how far along the way the in-betweens are"),
         ("engine", get_args(Engine), "what fills the volume around the mesh"),
         ("quality", get_args(Quality), "how fine the volume is"),
     ):
@@ -153,7 +155,11 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
         help="full turns that two shapes cannot tell (default: 0)",
     )
     command.add_argument(
-        "--seed", type=_seed, default=_DEFAULTS.seed, metavar="S", help="of the delaunay engine's samples (default: 0)"
+        "--seed",
+        type=_whole_number,
+        default=_DEFAULTS.seed,
+        metavar="S",
+        help="of the delaunay engine's samples (default: 0)",
     )
 
 
@@ -162,13 +168,6 @@ def _frame_count(text: str) -> int:
     if not 0 <= count <= MOST_FRAMES:
         raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")
     return count
-
-
-def _seed(text: str) -> int:
-    seed = _whole_number(text)
-    if seed < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative; a seed is 0 or more")
-    return seed
 
 
 def _whole_number(text: str) -> int:

@@ -72,14 +72,21 @@ def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkey
         pass
 
     def prepare(pair: KeyPair, settings: Settings) -> None:
-        expected = Settings("linear", "logarithmic", -2, engine="delaunay", quality="draft", seed=5)
-        assert settings == expected
+        assert settings == Settings(
+            mode="linear",
+            stretch="logarithmic",
+            easing="ease-in",
+            extra_turns=-2,
+            engine="delaunay",
+            quality="draft",
+            seed=5,
+        )
         raise Reached
 
     monkeypatch.setattr(cli, "prepare", prepare)
-    options = ["--mode", "linear", "--stretch", "logarithmic", "--extra-turns", "-2", "--seed", "5"]
+    options = ["--mode", "linear", "--stretch", "logarithmic", "--easing", "ease-in", "--extra-turns", "-2"]
     with pytest.raises(Reached):
-        interpolate(bar_file, tmp_path / "frames.npz", *options)
+        interpolate(bar_file, tmp_path / "frames.npz", *options, "--seed", "5")
 
 
 def test_the_same_seed_gives_the_same_frames(bar_file: Path, tmp_path: Path) -> None:
@@ -111,7 +118,7 @@ def test_real_keys(data_folder: Path, tmp_path: Path) -> None:
         (["--stretch", "rubber"], "'rubber'"),
         (["--extra-turns", "1000"], "1000 extra turns are asked for"),
         (["--extra-turns", "half"], "'half' is not a whole number"),
-        (["--seed", "-3"], "-3 is negative"),
+        (["--seed", "-3"], "The seed is -3"),
         (["--speed", "9"], "--speed"),
         (["--output", "missing/frames.npz"], "frames.npz cannot be written: No such file or directory"),
         (["--output", "bar.npz/frames.npz"], "frames.npz cannot be written: Not a directory"),

@@ -12,6 +12,7 @@ from .tetmesh import Floats, Ints
 _MOST_DIPOLES = 8_000
 # Queries at once: few enough that their distances to all dipoles stay in the processor's cache.
 _CHUNK = 64
+_ROUNDING = 1e-14  # of squared distances in the cube
 
 
 def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
@@ -24,7 +25,7 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
     Parameters
     ----------
     points : (n, 3), faces : (m, 3)
-        The surface; it may be open, overlap itself or be in many parts.
+        The surface, cube units; it may be open, overlap itself or be in many parts.
     queries : (k, 3)
 
     Returns
@@ -33,8 +34,8 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
     """
     centres, normals = _dipoles(points, faces)
     areas = np.linalg.norm(normals, axis=1)
-    # A disc of the dipole's area softens the singularity at its centre.
-    softening = areas / np.pi
+    # A disc of the dipole's area softens the singularity at its centre; rounding of the squares must not matter there.
+    softening = np.maximum(areas / np.pi, _ROUNDING)
     moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centres)])
     numbers = np.empty(len(queries))
     for begin in range(0, len(queries), _CHUNK):
@@ -53,7 +54,7 @@ def _dipoles(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
     if len(faces) <= _MOST_DIPOLES:
         return centres, normals
     areas = np.linalg.norm(normals, axis=1)
-    cell = np.sqrt(2.0 * areas.sum() / _MOST_DIPOLES)
+    cell = max(float(np.sqrt(2.0 * areas.sum() / _MOST_DIPOLES)), _ROUNDING)
     # Triangles that face apart must not cancel: the octant of the normal is part of the group's key.
     keys = np.column_stack([np.floor(centres / cell), normals > 0.0])
     _, group = np.unique(keys, axis=0, return_inverse=True)

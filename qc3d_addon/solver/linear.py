@@ -40,14 +40,18 @@ class LinearMaps:
 
 
 class LinearFrames:
-    """Frames of mode ``linear``: the rebuilt maps at the landmarks, what the fit missed blended in."""
+    """Frames of mode ``linear``: the rebuilt maps at the landmarks, what the fit missed blended in.
+
+    Rebuilding promises no bijection in space: a rebuilt map with folds gives way to one without, of nearly the same
+    landmarks.
+    """
 
     notes: tuple[str, ...] = ()
 
     def __init__(self, prepared: PreparedMap) -> None:
         self._prepared = prepared
         self._maps = LinearMaps(prepared.mesh, prepared.mapped)
-        self._limit = CrossingLimit(prepared.pair.faces, prepared.pair.key0, prepared.pair.key1)
+        self._limit = CrossingLimit(prepared.pair.faces, prepared.embedding.key0, prepared.embedding.key1)
         self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
 
     def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
@@ -57,10 +61,12 @@ class LinearFrames:
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             values = self._maps.at(time)
-            positions = self._prepared.embedding.from_cube(
-                self._prepared.landmarks @ values + time * self._missed, time
-            )
+            folded = self._prepared.folds(values) > 0
+            if folded:
+                values = self._prepared.unfolded(values, time)
+            shape = self._prepared.landmarks @ values + time * self._missed
+            positions = self._prepared.embedding.from_cube(shape, time)
             # A part that both keys leave in place must not breathe with the map around it.
             positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
-            made.append(Frame.of(self._prepared, positions, values, time, False, self._limit.excess(positions)))
+            made.append(Frame.of(self._prepared, positions, values, time, folded, self._limit.excess(shape)))
         return made

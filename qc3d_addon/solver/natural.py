@@ -21,7 +21,6 @@ from .uncrossing import CrossingLimit
 from .volume_path import VolumePath
 from .winding import winding_numbers
 
-_REPAIR_ITERATIONS = 15
 _UNCROSSING_ATTEMPTS = 3
 # How many times as strongly the surface is drawn to the volume's anchors at a crossing.
 _STRONGEST_ANCHOR = 1e5
@@ -117,7 +116,7 @@ class NaturalFrames:
         for index, time in enumerate(times.tolist()):
             values = volumes[index]
             folded = self._prepared.folds(values) > 0
-            unfolded = self._unfolded(values, time) if folded else values
+            unfolded = self._prepared.unfolded(values, time) if folded else values
             shape = self._placed(positions[index], time)
             made.append(Frame.of(self._prepared, shape, unfolded, time, folded, crossings[index]))
         return made
@@ -134,12 +133,6 @@ class NaturalFrames:
     def _anchor(self, values: Floats, time: float) -> Floats:
         """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
         return np.asarray(self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1])
-
-    def _unfolded(self, values: Floats, time: float) -> Floats:
-        """A map without folds with nearly the same landmarks, from the nearest one on the way to the second key."""
-        maps = self._prepared.maps
-        nearest = maps[round(time * (len(maps) - 1))]
-        return self._prepared.fitter.fit(nearest, self._prepared.landmarks @ values, _REPAIR_ITERATIONS)
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats]

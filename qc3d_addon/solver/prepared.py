@@ -17,6 +17,8 @@ from .location import interpolation_matrix
 from .rotations import determinants
 from .tetmesh import Floats, TetMesh
 
+_REPAIR_ITERATIONS = 15
+
 
 @dataclass(frozen=True, eq=False)
 class PreparedMap:
@@ -77,6 +79,11 @@ class PreparedMap:
     def folds(self, values: Floats) -> int:
         """Tetrahedra that the map with these values (N, 3) does not keep positively oriented."""
         return int((determinants(self.mesh.jacobians(values)) <= 0.0).sum())
+
+    def unfolded(self, values: Floats, time: float) -> Floats:
+        """A map without folds with nearly the landmarks of the map ``values`` (N, 3), from the nearest on the way."""
+        nearest = self.maps[round(time * (len(self.maps) - 1))]
+        return self.fitter.fit(nearest, self.landmarks @ values, _REPAIR_ITERATIONS)
 
     def landmark_residual(self) -> dict[str, float]:
         """Distance of the mapped landmarks from the second key: ``rms`` and ``max``, over the bounding-box diagonal."""

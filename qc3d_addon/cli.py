@@ -11,14 +11,15 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from importlib import metadata
+from itertools import pairwise
 from pathlib import Path
 from typing import NoReturn, get_args
 
 from .progress_bars import StageBars
-from .solver.array_files import read_pair, replacing, write_frames
+from .solver.array_files import read_pairs, replacing, write_frames
 from .solver.easing import Easing
-from .solver.errors import InputError, QC3DError
-from .solver.pipeline import evenly_spaced, finish, inbetweens, prepare
+from .solver.errors import InputError, QC3DError, naming_pair
+from .solver.pipeline import chain_inbetweens, evenly_spaced, finish, prepare
 from .solver.settings import Engine, Mode, Quality, Settings
 from .solver.stretch import StretchLaw
 
@@ -52,20 +53,25 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _interpolate(arguments: argparse.Namespace) -> None:
     settings = _settings(arguments)
     _require_distinct_files(arguments.pair, arguments.output, arguments.report)
-    pair = read_pair(arguments.pair, arguments.first, arguments.second)
+    names = _key_names(arguments)
+    pairs = read_pairs(arguments.pair, names)
+    times = evenly_spaced((arguments.frames + 1) * len(pairs) - 1)
     with ExitStack() as stack:
         output = stack.enter_context(replacing(arguments.output))
         report = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
         with StageBars() as bars:
-            prepared = finish(prepare(pair, settings), bars)
-            bake = finish(inbetweens(prepared, evenly_spaced(arguments.frames), settings), bars)
+            prepared = []
+            for pair, ends in zip(pairs, pairwise(names), strict=True):
+                with naming_pair(*ends, names):
+                    prepared.append(finish(prepare(pair, settings), bars))
+            bake = finish(chain_inbetweens(prepared, times, settings), bars)
         try:
-            write_frames(output, pair, bake.times, bake.frames)
+            write_frames(output, pairs, bake.times, bake.frames)
             if report is not None:
                 report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
-    _print_notes(prepared.notes)
+    _print_notes(bake.report["notes"])
 
 
 def _bake(arguments: argparse.Namespace) -> None:
@@ -75,9 +81,7 @@ def _bake(arguments: argparse.Namespace) -> None:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     _require_distinct_files(arguments.file, arguments.report)
     _require_distinct_files(arguments.output, arguments.report)
-    request = BakeRequest(
-        arguments.first, arguments.second, arguments.frames, _settings(arguments), arguments.keyframes
-    )
+    request = BakeRequest(_key_names(arguments), arguments.frames, _settings(arguments), arguments.keyframes)
     with StageBars() as bars:
         result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)
     _print_notes(result.notes)
@@ -86,6 +90,10 @@ def _bake(arguments: argparse.Namespace) -> None:
 def _print_notes(notes: Iterable[str]) -> None:
     for note in notes:
         print(f"qc3d: {note}", file=sys.stderr)
+
+
+def _key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
+    return (arguments.first, *arguments.via, arguments.last)
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
@@ -101,15 +109,15 @@ def _require_distinct_files(*paths: Path | None) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="qc3d", description="In-betweens between two shapes of one mesh, through fold-free maps.")
+    parser = _Parser(prog="qc3d", description="In-betweens between shapes of one mesh, through fold-free maps.")
     parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    interpolate = commands.add_parser("interpolate", help="in-betweens of two shapes in an .npz file")
+    interpolate = commands.add_parser("interpolate", help="in-betweens of shapes in an .npz file")
     interpolate.add_argument(
         "pair", type=Path, metavar="PAIR.npz", help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3)"
     )
-    _add_keys(interpolate, "shape", "FRAMES.npz", "faces, frames (N + 2, n, 3), times, key0, key1")
+    _add_keys(interpolate, "shape", "FRAMES.npz", "faces, frames, times, key0, key1")
     _add_settings(interpolate)
     interpolate.set_defaults(run=_interpolate)
 
@@ -131,8 +139,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents: str) -> None:
     command.add_argument("--from", dest="first", required=True, metavar="NAME", help=f"the {kind} to start from")
-    command.add_argument("--to", dest="second", required=True, metavar="NAME", help=f"the {kind} to end with")
-    command.add_argument("--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens")
+    command.add_argument(
+        "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; once for each, in order"
+    )
+    command.add_argument("--to", dest="last", required=True, metavar="NAME", help=f"the {kind} to end with")
+    command.add_argument(
+        "--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens between every two"
+    )
     command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
     command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
 

@@ -5,55 +5,61 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
+from ..solver.easing import eased
 from ..solver.errors import InputError
 from ..solver.settings import Settings
 from . import checks, mesh_data, names, shape_keys
-from .records import Chain, KeptMap, Record
-
-if TYPE_CHECKING:
-    from ..solver.keypair import KeyPair
-    from ..solver.pipeline import Progress
-    from ..solver.prepared import PreparedMap
-
-OnProgress = Callable[["Progress"], None]
+from .maps import OnProgress, maps_of_pairs
+from .records import Chain, Record
 
 
 @dataclass(frozen=True)
 class BakeRequest:
-    """What to bake between two shape keys of an object.
+    """What to bake between shape keys of an object.
 
     Parameters
     ----------
-    from_key, to_key
-        Names of the first and the second key.
+    keys
+        Names of two keys or more, from the first to the last; the same name may come again, but not twice in a row.
     count
-        Number of in-betweens, evenly spaced.
+        Number of in-betweens between every two keys that follow each other, evenly spaced.
     settings
         The solver's settings.
     keyframes
         First and last frame between which the slider goes from 0 to 1, or None to leave it without keyframes.
     """
 
-    from_key: str
-    to_key: str
+    keys: tuple[str, ...]
     count: int = 3
     settings: Settings = field(default_factory=Settings)
     keyframes: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
-        if not 1 <= self.count <= names.MAX_INBETWEENS:
-            raise InputError(f"{self.count} in-betweens are not possible; 1 to {names.MAX_INBETWEENS} are.")
+        if len(self.keys) < 2:
+            raise InputError("In-betweens need two keys or more.")
+        most = names.MAX_STEPS // (len(self.keys) - 1) - 1
+        if most < 1:
+            raise InputError(f"{len(self.keys)} keys in a row are too many for one slider; bake them in parts.")
+        if not 1 <= self.count <= most:
+            raise InputError(f"{self.count} in-betweens are not possible; 1 to {most} are.")
         if self.keyframes is not None and self.keyframes[0] >= self.keyframes[1]:
             first, last = self.keyframes
             raise InputError(f"Keyframes from {first} to {last} are not possible; the last must come after the first.")
+
+    @property
+    def intervals(self) -> int:
+        """Number of steps from the first key to the last."""
+        return (self.count + 1) * (len(self.keys) - 1)
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,7 @@ class BakeResult:
     slider_object
         Name of the object that has it.
     keys
-        Names of the generated shape keys, from the first key to the second.
+        Names of the generated shape keys, from the first key to the last.
     notes
         Sentences for the user.
     report
@@ -83,36 +89,34 @@ class BakeResult:
     def summary(self) -> str:
         """One sentence: what was made and where the slider is."""
         seconds = sum(self.report["seconds"].values())
+        total = self.report["count"] * (len(self.report["via"]) + 1)
         return (
-            f"{self.report['count']} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
+            f"{total} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
             f"the slider is '{self.slider}' on '{self.slider_object}'."
         )
 
 
 def prepare_object(obj: bpy.types.Object | None, request: BakeRequest, on_progress: OnProgress | None = None) -> None:
-    """Make the map of two keys anew and keep it with them, for later bakes.
+    """Make the map of every two keys that follow each other anew and keep it with them, for later bakes.
 
     Raises
     ------
     QC3DError
         If the object, the keys or the settings cannot be used; the object is as it was.
     """
-    # Imported where they are used, here and below: scipy would make Blender start slower.
-    from ..solver import storage
-
     obj = checks.require_object(obj)
     keys = obj.data.shape_keys
     record = Record.read(keys)
-    pair = mesh_data.read_pair(obj, request.from_key, request.to_key)
-    data = storage.to_bytes(_prepare(pair, request, on_progress))
-    record.keep_map(keys, _kept_map(pair, request), data)
+    pairs = mesh_data.read_pairs(obj, request.keys)
+    for made in maps_of_pairs(keys, pairs, request.settings, on_progress, None).values():
+        record.keep_map(keys, made.kept, made.data)
     record.write(keys)
 
 
 def bake_object(
     obj: bpy.types.Object | None, request: BakeRequest, on_progress: OnProgress | None = None
 ) -> BakeResult:
-    """Make the in-betweens of two keys, as shape keys that one slider plays.
+    """Make the in-betweens of two keys or a row of keys, as shape keys that one slider plays.
 
     Everything is computed and checked before anything is written.
 
@@ -121,36 +125,35 @@ def bake_object(
     QC3DError
         If the object, the keys or the settings cannot be used; the object is as it was.
     """
-    from ..solver import storage
-    from ..solver.pipeline import evenly_spaced, finish, inbetweens
+    # Imported where it is used: scipy would make Blender start slower.
+    from ..solver.pipeline import chain_inbetweens, evenly_spaced, finish
 
     obj = checks.require_object(obj)
     keys = obj.data.shape_keys
     record = Record.read(keys)
-    pair = mesh_data.read_pair(obj, request.from_key, request.to_key)
+    pairs = mesh_data.read_pairs(obj, request.keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
 
-    kept_map = _kept_map(pair, request)
-    data = record.kept_map(keys, kept_map)
-    if data is None:
-        prepared = _prepare(pair, request, on_progress)
-        data = storage.to_bytes(prepared)
-    else:
-        prepared = storage.from_bytes(data, pair)
-    bake = finish(inbetweens(prepared, evenly_spaced(request.count), request.settings), on_progress)
-    shapes = shape_keys.shapes_by_step(obj, chain, bake.frames)
+    maps = maps_of_pairs(keys, pairs, request.settings, on_progress, record)
+    prepared = [maps[ends].prepared for ends in pairwise(request.keys)]
+    times = evenly_spaced(request.intervals - 1)
+    bake = finish(chain_inbetweens(prepared, times, request.settings), on_progress)
+    met, passed = _keys_on_the_way(times, request)
+    shapes = shape_keys.shapes_by_step(obj, met, bake.frames)
 
-    notes = shape_keys.write_chain(obj, chain, shapes, request.count + 1, request.keyframes)
-    record.keep_map(keys, kept_map, data)
+    notes = shape_keys.write_chain(obj, chain, shapes, request.intervals, request.keyframes)
+    for used in maps.values():
+        record.keep_map(keys, used.kept, used.data)
     record.write(keys)
 
     owner = shape_keys.slider_owner(obj, chain).name
-    notes = [*bake.report["notes"], *notes, *_values_that_add(keys, request)]
+    notes = [*bake.report["notes"], *notes, *passed, *_values_that_add(keys, request)]
     report = {
         "object": obj.name,
-        "from": request.from_key,
-        "to": request.to_key,
+        "from": request.keys[0],
+        "via": list(request.keys[1:-1]),
+        "to": request.keys[-1],
         "count": request.count,
         "keys": list(chain.keys.values()),
         "slider": chain.slider,
@@ -222,33 +225,38 @@ def _open(path: Path) -> None:
 
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
-    """The pair's entry in the record, made where there is none."""
-    chain = record.chain(request.from_key, request.to_key)
+    """The entry of these keys in the record, made where there is none."""
+    chain = record.chain(request.keys)
     if chain is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
-        chain = Chain(request.from_key, request.to_key, names.chain_label(request.from_key, request.to_key, taken))
+        chain = Chain(request.keys, names.chain_label(request.keys, taken))
         record.chains.append(chain)
     return chain
 
 
-def _kept_map(pair: KeyPair, request: BakeRequest) -> KeptMap:
-    """The entry of a map that was made from exactly these keys and settings."""
-    from ..solver.storage import fingerprint
+def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[dict[int, str], list[str]]:
+    """Which step shows which of the request's keys, and a sentence for each key that the slider passes between steps.
 
-    settings = request.settings  # the mode is not part of it: one map serves every mode
-    made_from = f"{fingerprint(pair)} {settings.preparation}"
-    return KeptMap(request.from_key, request.to_key, made_from)
-
-
-def _prepare(pair: KeyPair, request: BakeRequest, on_progress: OnProgress | None) -> PreparedMap:
-    from ..solver.pipeline import finish, prepare
-
-    return finish(prepare(pair, request.settings), on_progress)
+    The steps are even on the slider, also where the way between the keys is eased.
+    """
+    along = eased(times, request.settings.easing) * (len(request.keys) - 1)
+    met, sentences = {}, []
+    for number, name in enumerate(request.keys):
+        step = int(np.abs(along - number).argmin())
+        if abs(along[step] - number) < 1e-9:
+            met[step] = name
+        else:
+            sentences.append(
+                f"With the easing {request.settings.easing} the slider passes '{name}' between two in-betweens, "
+                f"at {np.interp(number, along, times):.2f}; to meet it, bake with the easing linear and ease the "
+                "slider's keyframes."
+            )
+    return met, sentences
 
 
 def _values_that_add(keys: bpy.types.Key, request: BakeRequest) -> list[str]:
-    """A sentence for each of the two keys that is on by itself: the slider alone would show another shape."""
-    blocks = [keys.key_blocks[name] for name in (request.from_key, request.to_key)]
+    """A sentence for each of the keys that is on by itself: the slider alone would show another shape."""
+    blocks = [keys.key_blocks[name] for name in dict.fromkeys(request.keys)]
     return [
         f"Key '{key.name}' is on by itself ({key.value:.2f}), which adds to what the slider shows; set it to 0."
         for key in blocks

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import bpy
 
 from ..solver.errors import InputError
@@ -41,20 +44,32 @@ def require_object(obj: bpy.types.Object | None) -> bpy.types.Object:
     return obj
 
 
-def pair_problem(keys: bpy.types.Key, from_key: str, to_key: str) -> str | None:
-    """Why two names are not two shape keys of ``keys``, or None."""
-    for name, which in ((from_key, "first"), (to_key, "second")):
+def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
+    """Why names, from the first key to the last, are not shape keys of ``keys`` to go through, or None."""
+    for number, name in enumerate(names):
+        which = _which(number, len(names))
         if not name:
-            return f"Choose the {which} key."
+            return f"Choose {which}."
         if name not in keys.key_blocks:
-            return f"There is no shape key '{name}'; choose the {which} key from those of the mesh."
-    if from_key == to_key:
-        return f"'{from_key}' is both the first and the second key; choose two different keys."
+            return f"There is no shape key '{name}'; choose {which} from those of the mesh."
+    for name, following in pairwise(names):
+        if name == following and len(names) == 2:
+            return f"'{name}' is both the first and the second key; choose two different keys."
+        if name == following:
+            return f"'{name}' comes twice in a row; choose different keys one after the other."
     return None
 
 
-def require_pair(keys: bpy.types.Key, from_key: str, to_key: str) -> None:
-    """Raise InputError unless two names are two shape keys of ``keys``."""
-    problem = pair_problem(keys, from_key, to_key)
+def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:
+    """Raise InputError unless the names are shape keys of ``keys`` to go through."""
+    problem = keys_problem(keys, names)
     if problem is not None:
         raise InputError(problem)
+
+
+def _which(number: int, count: int) -> str:
+    if number == 0:
+        return "the first key"
+    if number == count - 1:
+        return "the second key" if count == 2 else "the last key"
+    return f"inner key {number}"

@@ -4,32 +4,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solver.errors import InputError
+from ..solver.errors import InputError, naming_pair
 from . import checks
 
 if TYPE_CHECKING:
     from ..solver.keypair import KeyPair
 
 
-def read_pair(obj: bpy.types.Object, from_key: str, to_key: str) -> KeyPair:
-    """Two shape keys of an object's mesh, checked.
+Ends = tuple[str, str]
+
+
+def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPair]:
+    """The pairs of shape keys that follow each other in ``names``, checked, by their names.
 
     Raises
     ------
     InputError
-        If they are not two shape keys of the mesh, or their coordinates cannot be used.
+        If they are not shape keys of the mesh, or their coordinates cannot be used.
     """
     from ..solver.keypair import KeyPair
 
-    checks.require_pair(obj.data.shape_keys, from_key, to_key)
-    first, second = (key_coordinates(obj, name) for name in (from_key, to_key))
-    return KeyPair.checked(first, second, triangles(obj.data), wire_edges(obj.data))
+    checks.require_keys(obj.data.shape_keys, names)
+    coordinates = {name: key_coordinates(obj, name) for name in names}
+    faces, edges = triangles(obj.data), wire_edges(obj.data)
+    pairs = {}
+    for ends in pairwise(names):
+        with naming_pair(*ends, names):
+            pairs[ends] = KeyPair.checked(coordinates[ends[0]], coordinates[ends[1]], faces, edges)
+    return pairs
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:

@@ -11,12 +11,14 @@ import bpy
 from ..solver.errors import InputError
 from . import checks, shape_keys, slider
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
+from .properties import ObjectSettings, key_names
 from .records import Record
 
 
 class QC3D_PT_inbetweens(bpy.types.Panel):
-    """Two keys, the number of in-betweens, and the button."""
+    """The keys, the number of in-betweens, and the button."""
 
     bl_label = "QC3D"
     bl_space_type = 'VIEW_3D'
@@ -30,8 +32,8 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         obj = context.active_object
         problem = checks.object_problem(obj)
         if problem is None:
-            self._draw_choices(layout, obj)
-            problem = checks.pair_problem(obj.data.shape_keys, obj.qc3d.from_key, obj.qc3d.to_key)
+            _draw_choices(layout, obj)
+            problem = checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d))
         buttons = layout.column()
         buttons.enabled = problem is None
         buttons.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
@@ -41,19 +43,34 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         if obj is not None and obj.type == 'MESH' and obj.data.shape_keys is not None:
             _draw_sliders(context, layout, obj)
 
-    def _draw_choices(self, layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-        settings, keys = obj.qc3d, obj.data.shape_keys
-        layout.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
-        layout.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
-        layout.prop(settings, "count")
-        layout.prop(settings, "mode")
-        layout.prop(settings, "quality")
-        layout.prop(settings, "engine")
-        layout.prop(settings, "use_keyframes")
-        if settings.use_keyframes:
-            frames = layout.column(align=True)
-            frames.prop(settings, "frame_start")
-            frames.prop(settings, "frame_end")
+
+def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    settings = obj.qc3d
+    _draw_keys(layout, settings, obj.data.shape_keys)
+    layout.prop(settings, "count")
+    layout.prop(settings, "mode")
+    layout.prop(settings, "quality")
+    layout.prop(settings, "use_keyframes")
+    if settings.use_keyframes:
+        frames = layout.column(align=True)
+        frames.prop(settings, "frame_start")
+        frames.prop(settings, "frame_end")
+    header, advanced = layout.panel("QC3D_advanced", default_closed=True)
+    header.label(text="Advanced")
+    if advanced is not None:
+        for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
+            advanced.prop(settings, name)
+
+
+def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.types.Key) -> None:
+    """A row for each key, in the order in which they are gone through."""
+    layout.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    for index, inner in enumerate(settings.via):
+        row = layout.row(align=True)
+        row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
+        row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='X').index = index
+    layout.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    layout.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
 
 
 def _draw_sliders(context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:

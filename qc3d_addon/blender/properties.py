@@ -4,75 +4,112 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import get_args
+from dataclasses import fields
+from typing import get_args, get_type_hints
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, StringProperty
 
-from ..solver.settings import Engine, Mode, Quality, Settings
+from ..solver.settings import Settings
 from .bake import BakeRequest
-from .names import MAX_INBETWEENS
+from .names import MAX_STEPS
 
 _DESCRIPTIONS = {
-    "natural": "Rotations, lengths and volumes are kept",
-    "linear": "The stretch of the volume is interpolated linearly, as published",
-    "auto": "TetWild where it can run, else Delaunay",
-    "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",
-    "delaunay": "Delaunay tetrahedra of graded samples; quick, repeatable, runs everywhere",
-    "draft": "Coarse volume, for a first look",
-    "normal": "What most characters need",
-    "fine": "Fine volume; slow",
+    "mode": {
+        "natural": "Rotations, lengths and volumes are kept",
+        "linear": "The stretch of the volume is interpolated linearly, as published",
+    },
+    "stretch": {
+        "linear": "Lengths grow by equal amounts",
+        "logarithmic": "Lengths grow by equal factors",
+    },
+    "easing": {
+        "linear": "Even speed",
+        "ease-in": "Starts slowly",
+        "ease-out": "Ends slowly",
+        "ease-in-out": "Starts and ends slowly",
+    },
+    "engine": {
+        "auto": "TetWild where it can run, else Delaunay",
+        "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",
+        "delaunay": "Delaunay tetrahedra of graded samples; quick, repeatable, runs everywhere",
+    },
+    "quality": {
+        "draft": "Coarse volume, for a first look",
+        "normal": "What most characters need",
+        "fine": "Fine volume; slow",
+    },
 }
 _DEFAULTS = Settings()
+_KINDS = get_type_hints(Settings)
 
 
-def _choices(literal: object) -> list[tuple[str, str, str]]:
-    return [(name, name.capitalize(), _DESCRIPTIONS.get(name, "")) for name in get_args(literal)]
+def _choice(setting: str, description: str) -> object:
+    """A menu of what one of the solver's settings may be."""
+    texts = _DESCRIPTIONS[setting]
+    return EnumProperty(
+        name=setting.capitalize(),
+        description=description,
+        items=[(name, name.capitalize(), texts.get(name, "")) for name in get_args(_KINDS[setting])],
+        default=getattr(_DEFAULTS, setting),
+        options={'SKIP_SAVE'},
+    )
 
 
-class PairChoices:
-    """Two keys, and how the volume around them is filled."""
+class InnerKey(bpy.types.PropertyGroup):
+    """A key between the first and the last, by its name."""
+
+
+class MapChoices:
+    """The keys, and everything that the maps between them depend on."""
 
     from_key: StringProperty(name="From", description="The shape key to start from", options={'SKIP_SAVE'})
+    via: CollectionProperty(
+        name="Through",
+        description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
+        type=InnerKey,
+        options={'SKIP_SAVE'},
+    )
     to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
-    engine: EnumProperty(
-        name="Engine",
-        description="What fills the volume around the mesh",
-        items=_choices(Engine),
-        default=_DEFAULTS.engine,
+    stretch: _choice("stretch", "How the mode natural interpolates stretches")
+    extra_turns: IntProperty(
+        name="Extra Turns",
+        description="Full turns, between every two keys, that two shapes cannot tell",
+        default=_DEFAULTS.extra_turns,
+        min=-100,
+        max=100,
+        soft_min=-5,
+        soft_max=5,
         options={'SKIP_SAVE'},
     )
-    quality: EnumProperty(
-        name="Quality",
-        description="How fine the volume is",
-        items=_choices(Quality),
-        default=_DEFAULTS.quality,
+    engine: _choice("engine", "What fills the volume around the mesh")
+    quality: _choice("quality", "How fine the volume is")
+    seed: IntProperty(
+        name="Seed",
+        description="Of the samples that the volume is made from",
+        default=_DEFAULTS.seed,
+        min=0,
         options={'SKIP_SAVE'},
     )
 
 
-class BakeChoices(PairChoices):
-    """A pair, and the in-betweens to make of it."""
+class BakeChoices(MapChoices):
+    """The keys, and the in-betweens to make between them."""
 
     count: IntProperty(
         name="In-Betweens",
-        description="Number of in-betweens, evenly spaced from the first key to the second",
+        description="Number of in-betweens between every two keys, evenly spaced",
         default=3,
         min=1,
-        max=MAX_INBETWEENS,
+        max=MAX_STEPS - 1,
         soft_max=20,
         options={'SKIP_SAVE'},
     )
-    mode: EnumProperty(
-        name="Mode",
-        description="How the map between the keys is interpolated",
-        items=_choices(Mode),
-        default=_DEFAULTS.mode,
-        options={'SKIP_SAVE'},
-    )
+    mode: _choice("mode", "How the map between the keys is interpolated")
+    easing: _choice("easing", "How the speed from the first key to the last changes")
     use_keyframes: BoolProperty(
         name="Keyframes",
-        description="Animate the slider from the first key to the second",
+        description="Animate the slider from the first key to the last",
         default=False,
         options={'SKIP_SAVE'},
     )
@@ -80,7 +117,7 @@ class BakeChoices(PairChoices):
         name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
     )
     frame_end: IntProperty(
-        name="End", description="Frame at which the slider is at the second key", default=25, options={'SKIP_SAVE'}
+        name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
     )
 
 
@@ -88,24 +125,40 @@ class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
 
 
+# Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class
+# inherits both properties and methods from a class of its own.
+
+
 def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSettings) -> None:
-    """Give every property that the caller of an operator left out the value that the panel shows."""
+    """Give every property that the caller of an operator left out the value that the panel shows.
+
+    The keys go together: who names the first or the last means those between as they are given, none included.
+    """
+    if not any(properties.is_property_set(name) for name in ("from_key", "to_key", "via")):
+        for inner in settings.via:
+            properties.via.add().name = inner.name
     shared = set(properties.bl_rna.properties.keys()) & set(settings.bl_rna.properties.keys())
-    for name in shared - {"rna_type"}:
+    for name in shared - {"rna_type", "via"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))
 
 
-def bake_request(choices: BakeChoices) -> BakeRequest:
-    """The choices as a request; raises InputError where they do not fit together.
+def key_names(choices: MapChoices) -> tuple[str, ...]:
+    """The names of the keys from the first to the last."""
+    return (choices.from_key, *(inner.name for inner in choices.via), choices.to_key)
 
-    Not a method of the choices: the Python module of Blender 4.2 crashes at its end where a registered class inherits
-    both properties and methods from a class of its own.
-    """
+
+def solver_settings(choices: MapChoices) -> Settings:
+    """The choices that are the solver's; the others stay at their defaults."""
+    names = [field.name for field in fields(Settings) if hasattr(choices, field.name)]
+    return Settings(**{name: getattr(choices, name) for name in names})
+
+
+def bake_request(choices: BakeChoices) -> BakeRequest:
+    """The choices as a request; raises InputError where they do not fit together."""
     return BakeRequest(
-        from_key=choices.from_key,
-        to_key=choices.to_key,
+        keys=key_names(choices),
         count=choices.count,
-        settings=Settings(mode=choices.mode, engine=choices.engine, quality=choices.quality),
+        settings=solver_settings(choices),
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
     )

@@ -21,24 +21,23 @@ PROPERTY = "qc3d"
 
 @dataclass
 class Chain:
-    """One baked pair: its slider and the shape keys that the slider plays.
+    """One baked pair or row of keys: its slider and the shape keys that the slider plays.
 
     Parameters
     ----------
-    from_key, to_key
-        Names of the user's own two keys.
+    through
+        Names of the user's own keys that the slider goes through, from the first to the last.
     slider
         Name of the custom property that plays the chain.
     intervals
-        Number of in-betweens + 1.
+        Number of steps from the first key to the last.
     keys
-        Generated shape keys: their names by step, 0 (first key) to ``intervals`` (second key).
+        Generated shape keys: their names by step, 0 (first key) to ``intervals`` (last key).
     keyframes
         First and last frame of the keyframes that a bake put on the slider, or None.
     """
 
-    from_key: str
-    to_key: str
+    through: tuple[str, ...]
     slider: str
     intervals: int = 0
     keys: dict[int, str] = field(default_factory=dict)
@@ -96,9 +95,9 @@ class Record:
             keys.pop(kept.property_name, None)
         keys[PROPERTY] = json.dumps(asdict(self))
 
-    def chain(self, from_key: str, to_key: str) -> Chain | None:
-        """The chain of a pair, if it was baked before."""
-        return next((c for c in self.chains if (c.from_key, c.to_key) == (from_key, to_key)), None)
+    def chain(self, through: tuple[str, ...]) -> Chain | None:
+        """The chain through these keys, if it was baked before."""
+        return next((chain for chain in self.chains if chain.through == through), None)
 
     def kept_map(self, keys: bpy.types.Key, wanted: KeptMap) -> bytes | None:
         """The bytes of the map that was made from exactly what ``wanted`` names, if it is kept."""
@@ -116,6 +115,7 @@ class Record:
 
 def _chain(entry: dict[str, object]) -> Chain:
     chain = Chain(**entry)  # type: ignore[arg-type]
+    chain.through = tuple(str(name) for name in chain.through)
     chain.keys = {int(step): str(name) for step, name in dict(chain.keys).items()}
     chain.keyframes = None if chain.keyframes is None else (int(chain.keyframes[0]), int(chain.keyframes[1]))
     return chain

@@ -8,12 +8,16 @@ import bpy
 
 from . import cli, compat, panels, properties
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
 
 CLASSES = (
+    properties.InnerKey,  # before what has it
     properties.ObjectSettings,
     QC3D_OT_prepare,
     QC3D_OT_bake_inbetweens,
+    QC3D_OT_add_inner_key,
+    QC3D_OT_remove_inner_key,
     panels.QC3D_PT_inbetweens,
 )
 

@@ -66,36 +66,41 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
         raise InputError(f"The action '{action.name}' is linked; make it local, or bake without keyframes.")
 
 
-def shapes_by_step(obj: bpy.types.Object, chain: Chain, frames: NDArray[np.float64]) -> dict[int, NDArray[np.float32]]:
+def shapes_by_step(
+    obj: bpy.types.Object, met: dict[int, str], frames: NDArray[np.float64]
+) -> dict[int, NDArray[np.float32]]:
     """The shapes of a chain that need a shape key: every frame but the Basis, which shows where no key is on.
 
     Parameters
     ----------
+    met
+        Names of the user's own keys by the step that shows them.
     frames
-        (k, n, 3) positions from the first key to the second.
+        (k, n, 3) positions from the first key to the last.
 
     Returns
     -------
-    (n, 3) float32 positions by step, the two keys themselves bit for bit.
+    (n, 3) float32 positions by step, the user's keys bit for bit.
 
     Raises
     ------
     QC3DError
         If the frames are not finite positions of the mesh's vertices.
     """
-    first, second = (key_coordinates(obj, name) for name in (chain.from_key, chain.to_key))
-    if frames.ndim != 3 or frames.shape[1:] != first.shape:
-        raise QC3DError(f"The in-betweens have shape {frames.shape} for {len(first)} vertices; please report this.")
+    if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
+        raise QC3DError(
+            f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
+        )
     with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
         rounded = frames.astype(np.float32)
     if not np.isfinite(rounded).all():
         raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")
-    shapes = dict(enumerate([first, *rounded[1:-1], second]))
-    reference = obj.data.shape_keys.reference_key.name
-    if chain.from_key == reference:
-        del shapes[0]
-    elif chain.to_key == reference:
-        del shapes[len(frames) - 1]
+    shapes = dict(enumerate(rounded))
+    for step, name in met.items():
+        if name == obj.data.shape_keys.reference_key.name:
+            del shapes[step]
+        else:
+            shapes[step] = key_coordinates(obj, name)
     return shapes
 
 
@@ -108,7 +113,7 @@ def write_chain(
 ) -> list[str]:
     """Put the shapes of a chain into shape keys that one slider drives; where that fails, nothing is changed.
 
-    Keys of an earlier bake with as many in-betweens keep their place, name and driver and get the new shape; those of
+    Keys of an earlier bake with as many steps keep their place, name and driver and get the new shape; those of
     another number are replaced. No other key changes.
 
     Parameters
@@ -116,11 +121,11 @@ def write_chain(
     obj
         The object of the mesh.
     chain
-        The pair's record, which is brought up to date.
+        The record of the chain, which is brought up to date.
     shapes
-        (n, 3) float32 absolute positions by step, 0 to ``intervals``.
+        (n, 3) float32 absolute positions by step, 0 to ``intervals``; steps left out show the Basis.
     intervals
-        Number of in-betweens + 1.
+        Number of steps from the first key to the last.
     keyframes
         First and last frame of the slider's keyframes, or None for none.
 
@@ -137,8 +142,9 @@ def write_chain(
     notes = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
-        # Where the second key is the Basis, a slider that starts at its end leaves the object looking as it did.
-        if slider.ensure_property(owner, chain.slider, start=0.0 if intervals in shapes else 1.0):
+        # A slider that starts where it shows the Basis leaves the object looking as it did.
+        start = min(set(range(intervals + 1)) - shapes.keys(), default=0)
+        if slider.ensure_property(owner, chain.slider, start / intervals):
             undo.callback(owner.pop, chain.slider)
         written = dict(kept)
         for step in shapes.keys() - kept.keys():

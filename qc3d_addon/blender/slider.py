@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The one slider of a chain: a custom property of the object, the drivers that read it, and its keyframes.
 
-At 0 the slider shows the first key, at 1 the second, each through a copy that the bake makes, since the animator's own
-keys are not touched; the Basis needs no copy. Between two keys neither of which is the Basis, the slider thus shows the
-first key from the moment of the bake on. What other keys are on adds to it, as shape keys do.
+At 0 the slider shows the first key, at 1 the last, and on its way those between, each through a copy that the bake
+makes, since the animator's own keys are not touched; the Basis needs no copy. Where none of the keys is the Basis, the
+slider thus shows the first key from the moment of the bake on. What other keys are on adds to it, as shape keys do.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float) -> bool:
             soft_max=1.0,
             step=1.0,
             default=start,
-            description="Plays the in-betweens: 0 is the first key, 1 the second",
+            description="Plays the in-betweens: 0 is the first key, 1 the last",
         )
         # So that a character linked into a shot can be animated with it.
         obj.property_overridable_library_set(data_path(name), True)

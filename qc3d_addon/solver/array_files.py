@@ -7,15 +7,16 @@ from __future__ import annotations
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError, naming_pair
 from .keypair import KeyPair
 from .tetmesh import Floats
 
@@ -23,24 +24,27 @@ from .tetmesh import Floats
 _UNREADABLE = (OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
-def read_pair(path: Path, first: str, second: str) -> KeyPair:
-    """Read two shapes of one mesh.
+def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
+    """Read shapes of one mesh: a pair for every two of ``names`` that follow each other.
 
     Parameters
     ----------
     path : Path
         An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
         of the names. Other arrays are not looked at; pickled objects are refused.
-    first, second : str
-        Names of the two shapes.
+    names : sequence of str
+        Names of two shapes or more, no name twice in a row.
 
     Raises
     ------
     InputError
         If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys.
     """
-    if first == second:
-        raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
+    for first, second in pairwise(names):
+        if first == second and len(names) == 2:
+            raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
+        if first == second:
+            raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
     try:
         archive = np.load(path, allow_pickle=False)
     except OSError as error:
@@ -50,23 +54,27 @@ def read_pair(path: Path, first: str, second: str) -> KeyPair:
     if not isinstance(archive, NpzFile):
         raise InputError(f"{path} is not an .npz file of arrays; faces, shape_names and V0, V1, ... are needed.")
     with archive:
-        names = _array(archive, "shape_names", path)
-        if names.ndim != 1 or names.dtype.kind != "U":
+        shape_names = _array(archive, "shape_names", path)
+        if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
             raise InputError(f"shape_names in {path} must be a list of texts.")
-        known = names.tolist()
-        for name in (first, second):
+        known = shape_names.tolist()
+        for name in names:
             if name not in known:
                 raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
-        key0, key1 = (_array(archive, f"V{known.index(name)}", path) for name in (first, second))
+        keys = {name: _array(archive, f"V{known.index(name)}", path) for name in names}
         faces = _array(archive, "faces", path)
-    for key, name in ((key0, first), (key1, second)):
+    for name, key in keys.items():
         if key.dtype.kind not in "fiu":
             raise InputError(f"The shape {name!r} in {path} holds {key.dtype} values; coordinates must be numbers.")
-    return KeyPair.checked(key0, key1, faces)
+    pairs = []
+    for first, second in pairwise(names):
+        with naming_pair(first, second, names):
+            pairs.append(KeyPair.checked(keys[first], keys[second], faces))
+    return pairs
 
 
-def write_frames(path: Path, pair: KeyPair, times: Floats, frames: Floats) -> None:
-    """Write frames (k, n, 3) at ``times`` (k,) with the faces and both keys of the pair, compressed.
+def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats) -> None:
+    """Write frames (k, n, 3) at ``times`` (k,) with the faces, the first and the last key of the pairs, compressed.
 
     Raises
     ------
@@ -74,7 +82,8 @@ def write_frames(path: Path, pair: KeyPair, times: Floats, frames: Floats) -> No
         If the file cannot be written.
     """
     with path.open("wb") as file:
-        np.savez_compressed(file, faces=pair.faces, frames=frames, times=times, key0=pair.key0, key1=pair.key1)
+        ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
+        np.savez_compressed(file, faces=pairs[0].faces, frames=frames, times=times, **ends)
 
 
 @contextmanager

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
 
 class QC3DError(Exception):
     """Base of every error that QC3D raises on purpose; its text is meant for the user."""
@@ -19,3 +22,14 @@ class MeshingError(QC3DError):
 
 class ReconstructionError(QC3DError):
     """A map cannot be rebuilt from its representation and boundary conditions."""
+
+
+@contextmanager
+def naming_pair(first: str, second: str, chain: Sequence[str]) -> Iterator[None]:
+    """Put in front of an error's sentence which two keys of a chain of more it is about."""
+    try:
+        yield
+    except QC3DError as error:
+        if len(chain) == 2:
+            raise
+        raise type(error)(f"From '{first}' to '{second}': {error}") from error

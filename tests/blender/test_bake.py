@@ -250,7 +250,7 @@ class TestSlider:
         from qc3d_addon.blender.bake import BakeRequest, bake_object
 
         figure.data.shape_keys.key_blocks["Lean"].value = 0.5
-        result = bake_object(figure, BakeRequest("Basis", "Lean", 1))
+        result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1))
         assert any("'Lean' is on by itself (0.50)" in note for note in result.notes)
 
 

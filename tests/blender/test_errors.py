@@ -244,14 +244,14 @@ class TestLaterFailures:
         value: float,
         said: str,
     ) -> None:
-        inbetweens = pipeline.inbetweens
+        chain_inbetweens = pipeline.chain_inbetweens
 
         def spoiled(*arguments: object) -> pipeline.Steps[pipeline.Bake]:
-            made = yield from inbetweens(*arguments)
+            made = yield from chain_inbetweens(*arguments)
             made.frames[2, 4, 1] = value
             return made
 
-        monkeypatch.setattr(pipeline, "inbetweens", spoiled)
+        monkeypatch.setattr(pipeline, "chain_inbetweens", spoiled)
         before = state()
         assert said in bake()
         assert state() == before

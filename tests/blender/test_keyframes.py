@@ -70,9 +70,9 @@ def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     bake()
     figure[SLIDER] = 0.25
     figure.keyframe_insert(PATH, frame=7)
-    result = bake_object(figure, BakeRequest("Basis", "Lean", 1, keyframes=(1, 11)))
+    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11)))
     assert keyframes(figure) == [(7.0, 0.25)]
-    assert result.notes == (f"The slider '{SLIDER}' is animated already; its keyframes were left as they are.",)
+    assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
 
 
 def test_other_animation_of_the_object_stays(figure: bpy.types.Object) -> None:

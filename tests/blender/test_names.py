@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qc3d_addon.blender.names import LIMIT, MAX_INBETWEENS, chain_label, key_name
+from qc3d_addon.blender.names import LIMIT, MAX_STEPS, chain_label, key_name
 
 # What Blender can hold as a key's name: up to 63 bytes.
 key_names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=63).filter(
@@ -17,7 +17,7 @@ key_names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, 
 
 
 def test_short_names_are_kept_whole() -> None:
-    assert chain_label("Basis", "Smile", set()) == "Basis→Smile"
+    assert chain_label(["Basis", "Smile"], set()) == "Basis→Smile"
     assert [key_name("Basis→Smile", step, 4) for step in (1, 2, 3)] == [
         "Basis→Smile 1/4",
         "Basis→Smile 2/4",
@@ -26,7 +26,7 @@ def test_short_names_are_kept_whole() -> None:
 
 
 def test_a_long_name_keeps_both_ends_and_uses_the_room_of_a_short_one() -> None:
-    label = chain_label("Basis", "CC_Base_Body_Mouth_Corner_Upper_Lip_Raiser_Left", set())
+    label = chain_label(["Basis", "CC_Base_Body_Mouth_Corner_Upper_Lip_Raiser_Left"], set())
     first, second = label.split("→")
     assert first == "Basis"
     assert second.startswith("CC_Base_Body_Mouth_C…")
@@ -35,14 +35,14 @@ def test_a_long_name_keeps_both_ends_and_uses_the_room_of_a_short_one() -> None:
 
 def test_a_label_that_is_taken_gets_a_number() -> None:
     taken = {"A→B"}
-    assert chain_label("A", "B", taken) == "A→B (2)"
-    assert chain_label("A", "B", taken | {"A→B (2)"}) == "A→B (3)"
+    assert chain_label(["A", "B"], taken) == "A→B (2)"
+    assert chain_label(["A", "B"], taken | {"A→B (2)"}) == "A→B (3)"
 
 
 @given(key_names, key_names)
 def test_names_fit_with_the_suffix_that_blender_may_add(first: str, second: str) -> None:
-    label = chain_label(first, second, set())
-    longest = key_name(label, MAX_INBETWEENS + 1, MAX_INBETWEENS + 1)
+    label = chain_label([first, second], set())
+    longest = key_name(label, MAX_STEPS, MAX_STEPS)
     assert len((longest + ".001").encode()) <= LIMIT
     assert "→" in label
 
@@ -50,8 +50,8 @@ def test_names_fit_with_the_suffix_that_blender_may_add(first: str, second: str)
 @pytest.mark.parametrize("letter", ["a", "é", "表", "🙂"])
 def test_names_are_cut_between_characters(letter: str) -> None:
     name = (letter * 63).encode()[:63].decode(errors="ignore")
-    label = chain_label(name, name, set())
+    label = chain_label([name, name], set())
     assert set(label) == {letter, "…", "→"}
-    other = chain_label(name, name, {label})
+    other = chain_label([name, name], {label})
     assert other != label
     assert len(other.encode()) <= len(key_name("x" * 51, 1, 2).encode())

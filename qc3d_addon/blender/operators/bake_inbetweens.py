@@ -15,7 +15,7 @@ from .common import poll_active_object, progress_shown
 
 
 class QC3D_OT_bake_inbetweens(BakeChoices, bpy.types.Operator):
-    """Fill in the frames between two shape keys, as new shape keys that one slider plays"""
+    """Fill in the frames between two shape keys or more, as new shape keys that one slider plays"""
 
     bl_idname = "qc3d.bake_inbetweens"
     bl_label = "Bake In-Betweens"
@@ -29,8 +29,9 @@ class QC3D_OT_bake_inbetweens(BakeChoices, bpy.types.Operator):
         obj = context.active_object
         fill_from_panel(self.properties, obj.qc3d)
         try:
-            with progress_shown(context) as on_progress:
-                result = bake.bake_object(obj, bake_request(self), on_progress)
+            request = bake_request(self)
+            with progress_shown(context, len(request.keys) - 1) as on_progress:
+                result = bake.bake_object(obj, request, on_progress)
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}

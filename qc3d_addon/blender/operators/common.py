@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from ...solver.pipeline import Progress
 
-STAGES = ("mesh", "locate", "fit", "factor", "frames")
+STAGES_OF_A_MAP = 3  # mesh, locate, fit
+STAGES_OF_A_BAKE = ("factor", "frames")
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -29,11 +30,22 @@ def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Co
 
 
 @contextmanager
-def progress_shown(context: bpy.types.Context) -> Iterator[Callable[[Progress], None]]:
-    """Show the progress at the mouse pointer while the block runs."""
+def progress_shown(context: bpy.types.Context, maps: int) -> Iterator[Callable[[Progress], None]]:
+    """Show the progress at the mouse pointer while the block runs, which makes up to so many maps and then frames."""
     manager = context.window_manager
-    manager.progress_begin(0.0, float(len(STAGES)))
+    begun: list[str] = []
+
+    def show(progress: Progress) -> None:
+        if progress.stage in STAGES_OF_A_BAKE:
+            done = STAGES_OF_A_MAP * maps + STAGES_OF_A_BAKE.index(progress.stage)
+        else:
+            if not begun or begun[-1] != progress.stage:
+                begun.append(progress.stage)
+            done = len(begun) - 1
+        manager.progress_update(done + progress.fraction)
+
+    manager.progress_begin(0.0, float(STAGES_OF_A_MAP * maps + len(STAGES_OF_A_BAKE)))
     try:
-        yield lambda progress: manager.progress_update(STAGES.index(progress.stage) + progress.fraction)
+        yield show
     finally:
         manager.progress_end()

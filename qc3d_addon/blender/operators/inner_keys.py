@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators behind the panel's rows of keys between the first and the last."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from typing import ClassVar
+
+import bpy
+from bpy.props import IntProperty
+
+from .common import poll_active_object
+
+
+class QC3D_OT_add_inner_key(bpy.types.Operator):
+    """Go through one more shape key on the way"""
+
+    bl_idname = "qc3d.add_inner_key"
+    bl_label = "Add Key Between"
+    bl_options: ClassVar[set[str]] = {'UNDO', 'INTERNAL'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.active_object.qc3d.via.add()
+        return {'FINISHED'}
+
+
+class QC3D_OT_remove_inner_key(bpy.types.Operator):
+    """Do not go through this shape key"""
+
+    bl_idname = "qc3d.remove_inner_key"
+    bl_label = "Remove Key Between"
+    bl_options: ClassVar[set[str]] = {'UNDO', 'INTERNAL'}
+
+    index: IntProperty(name="Row", description="Row of the key, from 0", min=0, options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        rows = context.active_object.qc3d.via
+        if self.index >= len(rows):
+            self.report({'ERROR'}, f"There is no row {self.index}; there are {len(rows)}.")
+            return {'CANCELLED'}
+        rows.remove(self.index)
+        return {'FINISHED'}

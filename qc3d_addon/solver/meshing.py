@@ -72,6 +72,8 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
             require_filled_cube(mesh)
             return FilledCube(mesh, "tetwild", ())
         except MeshingError as error:
+            if settings.engine == "tetwild" and unavailable_reason() is not None:
+                raise MeshingError(f"{error} Choose the engine delaunay or auto.") from error
             if settings.engine == "tetwild":
                 raise
             notes.append(f"The cube was filled by the engine delaunay. {error}")

@@ -125,7 +125,7 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
     """
     reason = unavailable_reason()
     if reason is not None:
-        raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}. Choose the engine delaunay or auto.")
+        raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}.")
     with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
         folder = Path(name)
         for key, array in arrays.items():

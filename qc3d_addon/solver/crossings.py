@@ -15,6 +15,8 @@ _LEVEL_RATIO = 3.0
 # Cells of all smaller triangles are this fine: their numbers along three axes still fit into one integer.
 _FINEST_LEVEL = 12
 _CHUNK = 2_000_000
+# Triangles that go through each other by less than this part of the surface's size touch.
+_TOUCHING = 1e-10
 
 
 def crossing_pairs(points: Floats, faces: Ints) -> Ints:
@@ -33,11 +35,12 @@ def crossing_pairs(points: Floats, faces: Ints) -> Ints:
         return np.empty((0, 2), dtype=np.int64)
     corners = points[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
+    depth = _TOUCHING * float((high.max(axis=0) - low.min(axis=0)).max())
     codes = [np.empty(0, dtype=np.int64)]
     for first, second in _candidates(low, high):
         kept = _near_and_apart(low, high, faces, first, second)
         first, second = first[kept], second[kept]
-        crossing = _cross(corners[first], corners[second])
+        crossing = _cross(corners[first], corners[second], depth)
         codes.append(first[crossing] * len(faces) + second[crossing])
     unique = np.unique(np.concatenate(codes))
     return np.stack([unique // len(faces), unique % len(faces)], axis=1)
@@ -105,14 +108,20 @@ def _near_and_apart(low: Floats, high: Floats, faces: Ints, first: Ints, second:
     return kept
 
 
-def _cross(first: Floats, second: Floats) -> Bools:
-    """Whether triangles (k, 3, 3) cross: an edge of one goes through the inside of the other."""
+def _cross(first: Floats, second: Floats, depth: float) -> Bools:
+    """Whether triangles (k, 3, 3) cross deeper than ``depth``: an edge of one goes through the inside of the other."""
     result = np.zeros(len(first), dtype=bool)
     for triangle, other in ((first, second), (second, first)):
-        sides = _orientation(triangle[:, None, 0], triangle[:, None, 1], triangle[:, None, 2], other)
+        along, across = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+        normals, offsets = np.cross(along, across), other - triangle[:, None, 0]
+        heights = np.einsum("kci,ki->kc", offsets, normals)
+        # What moving every corner by the depth can change: in one plane only rounding would decide.
+        reach = np.linalg.norm(along, axis=1) + np.linalg.norm(across, axis=1)
+        change = np.linalg.norm(normals, axis=1)[:, None] + np.linalg.norm(offsets, axis=2) * reach[:, None]
+        heights[np.abs(heights) <= depth * change] = 0.0
         for start in range(3):
             end = (start + 1) % 3
-            apart = sides[:, start] * sides[:, end] < 0.0
+            apart = heights[:, start] * heights[:, end] < 0.0
             near = np.flatnonzero(apart & ~result)
             tail, head = other[near, start], other[near, end]
             turns = np.stack(

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver import crossings
 from qc3d_addon.solver.crossings import crossing_pairs
+from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.tetmesh import Floats, Ints
 
 from .meshes import icosphere
@@ -142,6 +143,17 @@ def test_two_triangles(other: list[list[float]], crosses: bool) -> None:
     points = np.concatenate([FLAT, np.array(other, dtype=float)])
     assert len(assert_as_tried(points, triangles(2))) == crosses
     assert len(crossing_pairs(points, np.array([[3, 5, 4], [2, 1, 0]]))) == crosses
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**32 - 1))
+def test_the_triangles_of_a_plane_do_not_cross_however_it_is_turned(seed: int) -> None:
+    # Rounding alone decides on which side of each other's planes their corners are.
+    random = np.random.default_rng(seed)
+    flat = np.column_stack([random.uniform(size=(300, 2)), np.zeros(300)])
+    turned = flat @ rotation_matrices(random.normal(size=(1, 3)))[0].T + random.normal(size=3)
+    assert not len(crossing_pairs(turned, triangles(100)))
+    assert not len(crossing_pairs(turned + 1e-13 * random.normal(size=turned.shape), triangles(100)))
 
 
 def test_meshes_that_do_not_cross() -> None:

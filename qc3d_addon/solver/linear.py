@@ -42,8 +42,8 @@ class LinearMaps:
 class LinearFrames:
     """Frames of mode ``linear``: the rebuilt maps at the landmarks, what the fit missed blended in.
 
-    Rebuilding promises no bijection in space: a rebuilt map with folds gives way to one without, of nearly the same
-    landmarks.
+    The scheme is the published one, folds included: nothing promises that a rebuilt map is a bijection in space, and
+    the report counts where it is not.
     """
 
     notes: tuple[str, ...] = ()
@@ -61,12 +61,9 @@ class LinearFrames:
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             values = self._maps.at(time)
-            folded = self._prepared.folds(values) > 0
-            if folded:
-                values = self._prepared.unfolded(values, time)
             shape = self._prepared.landmarks @ values + time * self._missed
             positions = self._prepared.embedding.from_cube(shape, time)
             # A part that both keys leave in place must not breathe with the map around it.
             positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
-            made.append(Frame.of(self._prepared, positions, values, time, folded, self._limit.excess(shape)))
+            made.append(Frame.of(self._prepared, positions, values, time, False, self._limit.excess(shape)))
         return made

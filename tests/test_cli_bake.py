@@ -59,6 +59,16 @@ def test_the_file_gets_its_inbetweens(scene: Path, tmp_path: Path, monkeypatch: 
         assert obj[report["slider"]] == pytest.approx(value, abs=1e-6)
 
 
+def test_a_chain_goes_there_and_back(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert bake(scene, "--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear") == 0
+    report = json.loads(Path("out.json").read_text())
+    assert report["via"] == ["Bent"]
+    assert report["keys"] == [f"Basis→Bent→Basis {step}/6" for step in range(1, 6)]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert set(report["keys"]) < set(bpy.data.objects["Bar"].data.shape_keys.key_blocks.keys())
+
+
 def test_a_file_may_be_baked_into_itself(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     copy = tmp_path / "out.blend"
@@ -76,6 +86,7 @@ def test_a_file_may_be_baked_into_itself(scene: Path, tmp_path: Path, monkeypatc
         (["--object", "Plain"], "'Plain' has fewer than two shape keys"),
         (["--to", "Up"], "no shape key 'Up'"),
         (["--to", "Basis"], "two different keys"),
+        (["--via", "Up"], "no shape key 'Up'; choose inner key 1"),
         (["--frames", "0"], "0 in-betweens are not possible"),
         (["--frames", "5000"], "5000 in-betweens are not possible"),
         (["--frames", "-1"], "-1 in-betweens are not possible"),

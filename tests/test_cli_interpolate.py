@@ -67,6 +67,36 @@ def test_frames_run_from_key_to_key(bar_file: Path, bar: dict[str, np.ndarray], 
     assert found["peak_memory_mb"] > 10
 
 
+def test_a_chain_runs_through_every_key(bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+    lifted = bar["V1"] + np.maximum(bar["V0"][:, 2:] - 2.0, 0.0) ** 2 * [0.0, 0.1, 0.0]
+    shapes = {"shape_names": np.array(["straight", "bent", "lifted"]), "V2": lifted}
+    np.savez(tmp_path / "three.npz", **(bar | shapes))
+    output, report = tmp_path / "frames.npz", tmp_path / "report.json"
+    options = ["--via", "bent", "--via", "straight", "--frames", "1", "--mode", "linear", "--report", str(report)]
+    assert interpolate(tmp_path / "three.npz", output, *options, second="lifted") == 0
+    with np.load(output, allow_pickle=False) as stored:
+        np.testing.assert_allclose(stored["times"], np.arange(7) / 6.0, atol=1e-15)
+        for index, key in ((0, "V0"), (2, "V1"), (4, "V0")):
+            np.testing.assert_array_equal(stored["frames"][index], bar[key])
+        np.testing.assert_array_equal(stored["frames"][6], lifted)
+        np.testing.assert_array_equal(stored["key0"], bar["V0"])
+        np.testing.assert_array_equal(stored["key1"], lifted)
+    assert len(json.loads(report.read_text())["folds"]["frames"]) == 7
+
+
+def test_the_notes_are_those_of_the_report(
+    bar: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mirrored key is out of reach of any map without folds, which only the frames' part of the work tells."""
+    np.savez(tmp_path / "mirrored.npz", **(bar | {"V1": bar["V0"] * [-1.0, 1.0, 1.0]}))
+    report = tmp_path / "report.json"
+    options = ["--mode", "linear", "--report", str(report)]
+    assert interpolate(tmp_path / "mirrored.npz", tmp_path / "frames.npz", *options) == 0
+    notes = json.loads(report.read_text())["notes"]
+    assert notes
+    assert capsys.readouterr().err == "".join(f"qc3d: {note}\n" for note in notes)
+
+
 def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Reached(Exception):
         pass
@@ -109,6 +139,8 @@ def test_real_keys(data_folder: Path, tmp_path: Path) -> None:
     [
         (["--from", "sideways"], "no shape 'sideways'; it has 'straight', 'bent'"),
         (["--to", "straight"], "two different keys"),
+        (["--via", "sideways"], "no shape 'sideways'; it has 'straight', 'bent'"),
+        (["--via", "bent"], "'bent' comes twice in a row"),
         (["--frames", "-1"], "-1 in-betweens are not possible"),
         (["--frames", "1000000000"], "1000000000 in-betweens are not possible"),
         (["--frames", "several"], "'several' is not a whole number"),

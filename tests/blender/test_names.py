@@ -55,3 +55,22 @@ def test_names_are_cut_between_characters(letter: str) -> None:
     other = chain_label([name, name], {label})
     assert other != label
     assert len(other.encode()) <= len(key_name("x" * 51, 1, 2).encode())
+
+
+def test_a_chain_shares_its_room_between_its_keys() -> None:
+    assert chain_label(["Rest", "Mid", "End"], set()) == "Rest→Mid→End"
+    long = "CC_Base_Body_Mouth_Corner_Raiser"
+    label = chain_label([long + "_1", "Rest", long + "_2"], set())
+    first, middle, last = label.split("→")
+    assert (middle, first[-2:], last[-2:]) == ("Rest", "_1", "_2")
+    assert abs(len(first) - len(last)) <= 1
+
+
+def test_a_long_chain_names_its_ends() -> None:
+    assert chain_label([f"Pose {number:03}" for number in range(12)], set()) == "Pose 000→…→Pose 011"
+
+
+@given(st.lists(key_names, min_size=2, max_size=12))
+def test_names_of_chains_fit(names: list[str]) -> None:
+    longest = key_name(chain_label(names, set()), MAX_STEPS, MAX_STEPS)
+    assert len((longest + ".001").encode()) <= LIMIT

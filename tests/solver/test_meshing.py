@@ -169,8 +169,8 @@ def test_without_pytetwild(monkeypatch: pytest.MonkeyPatch) -> None:
     assert engine_available("auto")
     filled = fill(*icosphere(1, 0.1), "auto")
     assert filled.engine == "delaunay"
-    assert "not installed" in filled.notes[0]
-    with pytest.raises(MeshingError, match="not installed"):
+    assert filled.notes[0].endswith("pytetwild is not installed for this Python.")
+    with pytest.raises(MeshingError, match=r"not installed for this Python. Choose the engine delaunay or auto"):
         fill(*icosphere(1, 0.1), "tetwild")
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -56,6 +57,24 @@ def bar_file(bar: dict[str, np.ndarray], tmp_path: Path) -> Path:
     """The bar in a file, as the command line reads it."""
     path = tmp_path / "bar.npz"
     np.savez(path, **bar)
+    return path
+
+
+@pytest.fixture(scope="session")
+def bar_scene(bar: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A .blend with the bar as the object "Bar", shape keys Basis and Bent, and "Plain", which has no shape keys."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = bpy.data.meshes.new("Bar")
+    mesh.from_pydata(bar["V0"].tolist(), [], bar["faces"].tolist())
+    obj = bpy.data.objects.new("Bar", mesh)
+    bpy.context.collection.objects.link(obj)
+    bpy.context.collection.objects.link(bpy.data.objects.new("Plain", mesh.copy()))
+    obj.shape_key_add(name="Basis", from_mix=False)
+    bent = obj.shape_key_add(name="Bent", from_mix=False)
+    bent.value = 0.0
+    bent.points.foreach_set("co", bar["V1"].astype(np.float32).ravel())
+    path = tmp_path_factory.mktemp("scene") / "bar.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
 
 

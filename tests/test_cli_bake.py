@@ -9,7 +9,6 @@ import os
 from pathlib import Path
 
 import bpy
-import numpy as np
 import pytest
 
 from qc3d_addon import cli
@@ -17,34 +16,16 @@ from qc3d_addon import cli
 QUICK = ["--quality", "draft", "--engine", "delaunay"]
 
 
-@pytest.fixture(scope="module")
-def scene(bar: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file with the bar as the object "Bar", with the shape keys Basis and Bent, and with an object without keys."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    mesh = bpy.data.meshes.new("Bar")
-    mesh.from_pydata(bar["V0"].tolist(), [], bar["faces"].tolist())
-    obj = bpy.data.objects.new("Bar", mesh)
-    bpy.context.collection.objects.link(obj)
-    bpy.context.collection.objects.link(bpy.data.objects.new("Plain", mesh.copy()))
-    obj.shape_key_add(name="Basis", from_mix=False)
-    bent = obj.shape_key_add(name="Bent", from_mix=False)
-    bent.value = 0.0
-    bent.points.foreach_set("co", bar["V1"].astype(np.float32).ravel())
-    path = tmp_path_factory.mktemp("scene") / "bar.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def bake(file: Path, *more: str) -> int:
     command = ["bake", str(file), "--object", "Bar", "--from", "Basis", "--to", "Bent", "--frames", "2"]
     return cli.main([*command, "--output", "out.blend", *QUICK, *more])
 
 
-def test_the_file_gets_its_inbetweens(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_file_gets_its_inbetweens(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    before = scene.read_bytes()
-    assert bake(scene, "--report", "out.json", "--keyframes", "10", "30") == 0
-    assert scene.read_bytes() == before
+    before = bar_scene.read_bytes()
+    assert bake(bar_scene, "--report", "out.json", "--keyframes", "10", "30") == 0
+    assert bar_scene.read_bytes() == before
     assert sorted(os.listdir()) == ["out.blend", "out.json"]
 
     report = json.loads(Path("out.json").read_text())
@@ -59,9 +40,9 @@ def test_the_file_gets_its_inbetweens(scene: Path, tmp_path: Path, monkeypatch: 
         assert obj[report["slider"]] == pytest.approx(value, abs=1e-6)
 
 
-def test_a_chain_goes_there_and_back(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chain_goes_there_and_back(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert bake(scene, "--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear") == 0
+    assert bake(bar_scene, "--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear") == 0
     report = json.loads(Path("out.json").read_text())
     assert report["via"] == ["Bent"]
     assert report["keys"] == [f"Basis→Bent→Basis {step}/6" for step in range(1, 6)]
@@ -69,10 +50,10 @@ def test_a_chain_goes_there_and_back(scene: Path, tmp_path: Path, monkeypatch: p
     assert set(report["keys"]) < set(bpy.data.objects["Bar"].data.shape_keys.key_blocks.keys())
 
 
-def test_a_file_may_be_baked_into_itself(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_may_be_baked_into_itself(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     copy = tmp_path / "out.blend"
-    copy.write_bytes(scene.read_bytes())
+    copy.write_bytes(bar_scene.read_bytes())
     assert bake(copy) == 0
     assert os.listdir() == ["out.blend"]
     bpy.ops.wm.open_mainfile(filepath=str(copy))
@@ -98,20 +79,20 @@ def test_a_file_may_be_baked_into_itself(scene: Path, tmp_path: Path, monkeypatc
 def test_unusable_options(
     options: list[str],
     said: str,
-    scene: Path,
+    bar_scene: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    before = scene.read_bytes()
-    assert bake(scene, *options) == 2
+    before = bar_scene.read_bytes()
+    assert bake(bar_scene, *options) == 2
     text = capsys.readouterr().err
     assert said in text
     assert text.startswith("qc3d: ")
     assert text.count("\n") == 1
     assert os.listdir() == []
-    assert scene.read_bytes() == before
+    assert bar_scene.read_bytes() == before
 
 
 @pytest.mark.parametrize("kind", ["missing", "text", "folder"])

@@ -11,6 +11,7 @@ import pytest
 from matplotlib import image
 
 import contact_sheet
+from qc3d_addon import cli
 from shading import Camera, best_view, draw
 
 RED, WHITE = (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -65,3 +66,21 @@ def test_a_sheet_of_frames_beside_the_straight_blend(bar: dict[str, np.ndarray],
     columns = np.array_split(mine, 4, axis=1)
     assert all(np.ptp(column) > 0.3 for column in columns)
     assert np.abs(columns[0] - columns[3][:, : columns[0].shape[1]]).max() > 0.3
+
+
+@pytest.mark.parametrize("through", [["Basis", "Bent"], ["Basis", "Bent", "Basis"]])
+def test_a_sheet_of_a_baked_scene(through: list[str], bar_scene: Path, tmp_path: Path) -> None:
+    baked, sheet = tmp_path / "baked.blend", tmp_path / "sheet.png"
+    keys = ["--object", "Bar", "--from", through[0], "--to", through[-1]]
+    keys += [option for name in through[1:-1] for option in ("--via", name)]
+    quick = ["--frames", "1", "--mode", "linear", "--quality", "draft", "--engine", "delaunay"]
+    assert cli.main(["bake", str(bar_scene), *keys, *quick, "--output", str(baked)]) == 0
+    contact_sheet.main([str(baked), *keys, "--height", "60", "--view", "front", "--output", str(sheet)])
+
+    picture = image.imread(sheet)[-60:, 44:, :3]
+    shapes = 2 * len(through) - 1
+    columns = picture.reshape(60, shapes, -1, 3).transpose(1, 0, 2, 3)
+    steps = np.abs(np.diff(columns, axis=0)).max(axis=(1, 2, 3))
+    assert (steps > 0.3).all()
+    if through[0] == through[-1]:
+        np.testing.assert_array_equal(columns[0], columns[-1])

@@ -44,7 +44,8 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("rows", nargs="+", metavar="[LABEL=]FILE", help="a baked .blend, or an .npz of frames")
     parser.add_argument("--object", help="in a .blend: the object")
     parser.add_argument("--from", dest="first", help="in a .blend: the first key")
-    parser.add_argument("--to", dest="second", help="in a .blend: the second key")
+    parser.add_argument("--via", action="append", default=[], help="in a .blend: a key between them; once for each")
+    parser.add_argument("--to", dest="last", help="in a .blend: the last key")
     parser.add_argument("--straight", action="store_true", help="add the straight blend of the keys as the first row")
     parser.add_argument("--view", choices=["auto", *VIEWS], default="auto")
     parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
@@ -103,15 +104,16 @@ def _read(text: str, arguments: argparse.Namespace) -> Row:
     label, _, name = text.rpartition("=")
     path = Path(name)
     if path.suffix == ".blend":
-        if None in (arguments.object, arguments.first, arguments.second):
+        if None in (arguments.object, arguments.first, arguments.last):
             raise SystemExit("A .blend needs --object, --from and --to.")
-        return _read_blend(label or path.stem, path, arguments.object, arguments.first, arguments.second)
+        through = (arguments.first, *arguments.via, arguments.last)
+        return _read_blend(label or path.stem, path, arguments.object, through)
     with np.load(path, allow_pickle=False) as stored:
         return Row(label or path.stem, stored["faces"].astype(np.int64), stored["times"], stored["frames"])
 
 
-def _read_blend(label: str, path: Path, name: str, first: str, second: str) -> Row:
-    """The user's two keys and the in-betweens that were baked between them."""
+def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> Row:
+    """The user's own keys and the in-betweens that were baked between them."""
     import bpy
 
     from qc3d_addon.blender.mesh_data import key_coordinates, triangles
@@ -119,10 +121,11 @@ def _read_blend(label: str, path: Path, name: str, first: str, second: str) -> R
 
     bpy.ops.wm.open_mainfile(filepath=str(path))
     obj = bpy.data.objects[name]
-    chain = Record.read(obj.data.shape_keys).chain(first, second)
+    chain = Record.read(obj.data.shape_keys).chain(through)
     if chain is None:
-        raise SystemExit(f"{path} has no in-betweens from {first!r} to {second!r}.")
-    keys = chain.keys | {0: first, chain.intervals: second}
+        raise SystemExit(f"{path} has no in-betweens of {' → '.join(through)}.")
+    stride = chain.intervals // (len(through) - 1)
+    keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
     steps = sorted(keys)
     frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
     return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)

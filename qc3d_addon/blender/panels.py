@@ -68,7 +68,7 @@ def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.t
     for index, inner in enumerate(settings.via):
         row = layout.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
-        row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='X').index = index
+        row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
     layout.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
     layout.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
 

@@ -53,9 +53,7 @@ class Turning:
         return np.asarray(np.maximum(np.linalg.norm(self.swing, axis=1), np.linalg.norm(self.twist, axis=1)))
 
 
-def consistent_turning(
-    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, extra_turns: int
-) -> Turning:
+def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools) -> Turning:
     """Turn every element so that neighbours agree, beyond 180 degrees and beyond 360 where they do.
 
     Parameters
@@ -70,8 +68,6 @@ def consistent_turning(
         What elements count in the axis of their part.
     held : (m,) bool
         Elements that touch what both keys leave in place.
-    extra_turns : int
-        Full turns to add to parts that nothing holds, in the direction in which they turn.
 
     Notes
     -----
@@ -92,10 +88,9 @@ def consistent_turning(
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
     phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
-    phases[loose] += 2.0 * np.pi * extra_turns
     far = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)) > _MOST_SWING
     share = np.bincount(forest.labels, weights=weights * far) / np.bincount(forest.labels, weights=weights)
-    twists = (share > _FAIR_SHARE)[forest.labels] | (loose & (extra_turns != 0))
+    twists = (share > _FAIR_SHARE)[forest.labels]
     twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
 

@@ -14,6 +14,7 @@ from .branches import Turning, swing_beside
 from .frame import Frame
 from .prepared import PreparedMap
 from .rates import Rates, hermite
+from .spins import ExtraSpins
 from .stretch import StretchLaw
 from .surface_path import SurfacePath
 from .tetmesh import Bools, Floats, Ints
@@ -41,7 +42,10 @@ class NaturalFrames:
         self.notes: tuple[str, ...] = ()
         embedding, mesh = prepared.embedding, prepared.mesh
         inside = winding_numbers(embedding.key0, prepared.pair.faces, mesh.centroids)
-        self._surface = SurfacePath(embedding, law, prepared.extra_turns)
+        self._surface = SurfacePath(embedding, law, prepared.extra_turns != 0)
+        self._spins = ExtraSpins(embedding, self._surface, prepared.extra_turns)
+        if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
+            self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         turning = _turning_inside(prepared, self._surface)
         self._volume = VolumePath(mesh, prepared.mapped, turning, inside, law)
         self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1)
@@ -102,7 +106,7 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
-        return self._placed(self._surface.positions(time, self._anchor(self._volume.at(time), time)), time)
+        return self._placed(self._shaped(self._surface, self._volume.at(time), time), time)
 
     def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
@@ -110,7 +114,7 @@ class NaturalFrames:
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             volumes.append(self._volume.at(time))
-            positions.append(self._surface.positions(time, self._anchor(volumes[-1], time)))
+            positions.append(self._shaped(self._surface, volumes[-1], time))
         positions, crossings = yield from self._uncrossed(times, volumes, positions)
         made = []
         for index, time in enumerate(times.tolist()):
@@ -129,6 +133,10 @@ class NaturalFrames:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
+
+    def _shaped(self, surface: SurfacePath, values: Floats, time: float) -> Floats:
+        """(n, 3) cube positions of a surface drawn to a map of the cube, its extra turns added."""
+        return self._spins.apply(surface.positions(time, self._anchor(values, time)), time)
 
     def _anchor(self, values: Floats, time: float) -> Floats:
         """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
@@ -150,10 +158,7 @@ class NaturalFrames:
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = [
-                surface.positions(time, self._anchor(values, time))
-                for time, values in zip(times.tolist(), volumes, strict=True)
-            ]
+            tried = [self._shaped(surface, values, time) for time, values in zip(times.tolist(), volumes, strict=True)]
             remaining = [self._limit.excess(shape) for shape in tried]
             if sum(remaining) >= sum(excess):
                 break

@@ -117,7 +117,7 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     yield Progress("locate", 1.0)
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        path = SurfacePath(embedding, settings.stretch, settings.extra_turns)
+        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
         followed = yield from _staged("fit", follow_path(fitter, path, embedding.key1))
     yield Progress("fit", 1.0)
     prepared = PreparedMap(

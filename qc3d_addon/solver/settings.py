@@ -29,8 +29,9 @@ class Settings:
     easing
         How far along the way the in-betweens are: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
     extra_turns
-        Full turns, -100..100, that two shapes cannot tell: added to components without still vertices; where
-        something is still, any number but 0 lets what is back in its place after whole turns turn with the rest.
+        Full turns, -100..100, that two shapes cannot tell: mode ``natural`` adds them to parts that turn freely, each
+        about its own axis. In parts that are held, any number but 0 lets what is back in its place after whole turns
+        turn with the rest.
     engine
         What fills the cube: ``tetwild``, ``delaunay``, or ``auto`` (tetwild where it can run).
     quality

@@ -52,9 +52,8 @@ class SurfacePath:
     embedding : Embedding
     law : StretchLaw
         How stretches are interpolated.
-    extra_turns : int
-        Full turns to add to every component without still vertices. In a component with still vertices any number
-        but 0 says that what comes back to its place after whole turns is not still, so that it turns with the rest.
+    free_after_turns : bool
+        Whether what comes back to its place after whole turns is not still, but turns with the rest of its component.
 
     Attributes
     ----------
@@ -68,7 +67,7 @@ class SurfacePath:
         How the triangles of ``deformation`` turn.
     """
 
-    def __init__(self, embedding: Embedding, law: StretchLaw = "linear", extra_turns: int = 0) -> None:
+    def __init__(self, embedding: Embedding, law: StretchLaw = "linear", free_after_turns: bool = False) -> None:
         self._law: StretchLaw = law
         self.vertices, self._group = welded(embedding.key0, embedding.key1)
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
@@ -80,10 +79,8 @@ class SurfacePath:
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
-        self.turning = consistent_turning(
-            usable.turns, face_adjacency(usable.faces), centres, usable.weights, held, extra_turns
-        )
-        if extra_turns:
+        self.turning = consistent_turning(usable.turns, face_adjacency(usable.faces), centres, usable.weights, held)
+        if free_after_turns:
             still[usable.faces[self.turning.angles > np.pi]] = False
         self.still = still[self._group]
         self._free = ~still

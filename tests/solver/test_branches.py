@@ -31,10 +31,10 @@ def forgotten(turns: Floats) -> Floats:
     return rotation_vectors(rotation_matrices(turns))
 
 
-def found(turns: Floats, adjacency: Ints, extra_turns: int = 0, held: Bools | None = None) -> Turning:
+def found(turns: Floats, adjacency: Ints, held: Bools | None = None) -> Turning:
     held = np.zeros(len(turns), dtype=bool) if held is None else held
     centres = np.column_stack([np.arange(len(turns)), np.zeros((len(turns), 2))])
-    return consistent_turning(turns, adjacency, centres, np.ones(len(turns)), held, extra_turns)
+    return consistent_turning(turns, adjacency, centres, np.ones(len(turns)), held)
 
 
 def assert_recovered(turns: Floats, adjacency: Ints, held: Bools | None = None) -> None:
@@ -98,31 +98,12 @@ class TestKnownTurns:
         np.testing.assert_allclose(found(forgotten(turns), chain(40)).swing, turns, rtol=0.0, atol=1e-12)
 
 
-class TestExtraTurns:
-    TURNS = np.linspace(0.0, 1.0, 10)[:, None] * np.array([0.0, 0.0, 1.0])
-
-    @pytest.mark.parametrize("extra", [1, -2])
-    def test_whole_turns_more(self, extra: int) -> None:
-        turning = found(self.TURNS, chain(10), extra)
-        more = self.TURNS + [0.0, 0.0, 2.0 * np.pi * extra]
-        for time in (0.3, 1.0):
-            np.testing.assert_allclose(turning.at(time), rotation_matrices(time * more), rtol=0.0, atol=1e-12)
-
-    def test_what_is_held_gets_none(self) -> None:
-        held = np.zeros(20, dtype=bool)
-        held[4] = True
-        adjacency = np.concatenate([chain(10), 10 + chain(10)])
-        turning = found(np.concatenate([self.TURNS, self.TURNS]), adjacency, 1, held)
-        np.testing.assert_allclose(turning.at(0.5)[:10], rotation_matrices(0.5 * self.TURNS), rtol=0.0, atol=1e-12)
-        assert turning.angles[10:].min() > 2.0 * np.pi - 1.1
-
-
 class TestAnyTurns:
-    @given(st.integers(0, 2**32 - 1), st.integers(-2, 2))
-    def test_rotations_stay_what_they_are(self, seed: int, extra: int) -> None:
+    @given(st.integers(0, 2**32 - 1))
+    def test_rotations_stay_what_they_are(self, seed: int) -> None:
         random = np.random.default_rng(seed)
         turns = forgotten(random.normal(scale=3.0, size=(40, 3)))
-        turning = found(turns, random.integers(0, 40, size=(60, 2)), extra)
+        turning = found(turns, random.integers(0, 40, size=(60, 2)))
         np.testing.assert_allclose(turning.at(1.0), rotation_matrices(turns), rtol=0.0, atol=1e-11)
         np.testing.assert_array_equal(turning.at(0.0), np.broadcast_to(np.eye(3), (40, 3, 3)))
 

@@ -82,8 +82,9 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
         If the file cannot be written.
     """
     with path.open("wb") as file:
-        ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
-        np.savez_compressed(file, faces=pairs[0].faces, frames=frames, times=times, **ends)
+        np.savez_compressed(
+            file, faces=pairs[0].faces, frames=frames, times=times, key0=pairs[0].key0, key1=pairs[-1].key1
+        )
 
 
 @contextmanager

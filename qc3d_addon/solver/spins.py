@@ -72,7 +72,7 @@ def _mean_turns(surface: SurfacePath, labels: Ints) -> Floats:
     count = int(labels.max()) + 1
     weight = np.bincount(owner, weights=deformation.weights, minlength=count)
     sums = [np.bincount(owner, weights=deformation.weights * turn, minlength=count) for turn in deformation.turns.T]
-    return np.stack(sums, axis=1) / np.maximum(weight, 1e-300)[:, None]
+    return np.asarray(np.stack(sums, axis=1) / np.maximum(weight, 1e-300)[:, None])
 
 
 def _held(points: Floats, still: Bools, labels: Ints) -> Bools:

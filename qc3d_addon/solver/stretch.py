@@ -12,6 +12,7 @@ import numpy as np
 from .tetmesh import Floats
 
 StretchLaw = Literal["linear", "logarithmic"]
+_FLATTEST = 1e-16
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,8 @@ class Stretch:
     def of(cls, matrices: Floats) -> Stretch:
         """Decompose (m, d, d) symmetric positive definite matrices."""
         values, vectors = np.linalg.eigh(matrices)
-        return cls(values, vectors)
+        # Where something is flattened as far as numbers go, rounding must not make it negative.
+        return cls(np.maximum(values, _FLATTEST * values[:, -1:]), vectors)
 
     def at(self, time: float, law: StretchLaw) -> Floats:
         """(m, d, d) stretches at ``time``: (1 - t) I + t P, or exp(t log P); positive definite for t in 0..1."""

@@ -51,6 +51,12 @@ def test_every_missed_limit_is_named() -> None:
     assert verdict({"error": "natural: no", "worst": {}, "details": {}}).misses() == ["failed: natural: no"]
 
 
+def test_what_is_asked_to_turn_may_leave_its_place() -> None:
+    drifting = {"straight": figures(1.0, 1.0), "natural": figures(0.0, 0.0, still_drift=0.3)}
+    assert Verdict(Pair("bar", "straight", "twist450"), drifting, ALWAYS).misses() == []
+    assert len(Verdict(Pair("bar", "straight", "twist270"), drifting, ALWAYS).misses()) == 1
+
+
 def test_not_a_number_misses_a_limit() -> None:
     assert len(verdict(figures(float("nan"), 0.0)).misses()) == 1
 

@@ -13,6 +13,10 @@ from numpy.typing import ArrayLike
 from .errors import InputError
 from .tetmesh import Floats, Ints
 
+# Squares and cubes of what lies between still are numbers.
+_SMALLEST, _LARGEST = 1e-90, 1e90
+_MOST_GROWTH = 1e10
+
 
 @dataclass(frozen=True, eq=False)
 class KeyPair:
@@ -41,7 +45,7 @@ class KeyPair:
         ------
         InputError
             If shapes disagree, a coordinate is not finite, an index is out of range, there are fewer than four
-            vertices, or all vertices of a key lie in one plane, line or point.
+            vertices, all vertices of a key lie in one plane, line or point, or sizes are beyond all reason.
         """
         first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
         if first.shape != second.shape:
@@ -52,6 +56,7 @@ class KeyPair:
             raise InputError(f"The mesh has {len(first)} vertices; at least 4 are needed to span a volume.")
         for key, name in ((first, "first"), (second, "second")):
             _require_volume(key, name)
+        _require_like_sizes(first, second)
         triangles = _indices(faces, 3, len(first), "faces")
         wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
         return cls(first, second, triangles, wires)
@@ -72,17 +77,31 @@ def _positions(key: ArrayLike, name: str) -> Floats:
             f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
             f"({bad.size} such vertices); repair the key first."
         )
+    largest = float(np.abs(positions).max(initial=0.0))
+    if largest > _LARGEST:
+        raise InputError(f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {_LARGEST:.0e}.")
     return positions
 
 
 def _require_volume(key: Floats, name: str) -> None:
     spread = key - key.mean(axis=0)
     size = np.abs(spread).max()
+    if 0.0 < size < _SMALLEST:
+        raise InputError(f"The {name} key is only {size:.0e} in size; scale the mesh to above {_SMALLEST:.0e}.")
     thickness = 0.0 if size == 0.0 else np.linalg.svd(spread / size, compute_uv=False)[-1] / np.sqrt(len(key))
     if thickness < 1e-9:
         raise InputError(
             f"All vertices of the {name} key lie in one plane, line or point; "
             "in-betweens need a key that spans a volume."
+        )
+
+
+def _require_like_sizes(first: Floats, second: Floats) -> None:
+    ratio = float(np.ptp(second, axis=0).max() / np.ptp(first, axis=0).max())
+    if not 1.0 / _MOST_GROWTH <= ratio <= _MOST_GROWTH:
+        raise InputError(
+            f"The second key is {ratio:.0e} times as large as the first, more than numbers can hold; "
+            "bring both keys to like sizes."
         )
 
 

@@ -31,12 +31,13 @@ from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
-SWEEPS = 20
+SWEEPS = 30
 # Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
 _OVER_RELAXATION = 1.7
 _LARGEST_VOLUME_STEP = 0.1
 _LAST_VOLUME_STEPS = 12
 _VOLUME_TOLERANCE = 1e-12
+_LEAST_VOLUME = 1e-12
 
 
 class SurfacePath:
@@ -132,6 +133,12 @@ class SurfacePath:
             (before.growth, after.growth),
         )
         return corrected
+
+    @property
+    def inside_out(self) -> int:
+        """How many closed components are mirrored or turned inside out between the keys: no motion of a volume does."""
+        first, second = (np.where(np.abs(volume) > _LEAST_VOLUME, volume, 0.0) for volume in self._volumes)
+        return int(np.count_nonzero(first * second < 0.0))
 
     def _factor(self) -> None:
         deformation, free = self.deformation, self._free

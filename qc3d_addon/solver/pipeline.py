@@ -132,13 +132,23 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
         seconds,
     )
     missed = prepared.landmark_residual()["rms"]
-    if missed <= _LARGE_RESIDUAL:
+    if path.inside_out:
+        note = (
+            f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
+            "does that, and a straight blend may look no worse."
+        )
+    elif missed > _LARGE_RESIDUAL:
+        note = (
+            f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
+            "cannot be reached without folds, and its in-betweens are no better than a straight blend."
+        )
+    else:
         return prepared
-    note = (
-        f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
-        "cannot be reached without folds, and its in-betweens are no better than a straight blend."
-    )
     return replace(prepared, notes=(*filled.notes, note))
+
+
+def _closed_parts(count: int) -> str:
+    return "A closed part of the mesh is" if count == 1 else f"{count} closed parts of the mesh are"
 
 
 def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> Steps[Bake]:

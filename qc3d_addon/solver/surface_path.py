@@ -31,7 +31,7 @@ from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
-SWEEPS = 20
+SWEEPS = 30
 # Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
 _OVER_RELAXATION = 1.7
 _LARGEST_VOLUME_STEP = 0.1

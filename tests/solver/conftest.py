@@ -37,5 +37,5 @@ def mesh(request: pytest.FixtureRequest) -> TetMesh:
 def coarse_volume() -> Iterator[None]:
     """Quality ``draft`` ten times as fast, for what does not depend on how fine the volume is."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(RESOLUTIONS, "draft", Resolution(spacing=0.1, slope=0.5, largest=0.3))
+        patch.setitem(RESOLUTIONS, "draft", Resolution(spacing=0.07, slope=0.4, largest=0.2))
         yield

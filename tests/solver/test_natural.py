@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.crossings import crossing_pairs
-from qc3d_addon.solver.embedding import Embedding, RigidMotion
+from qc3d_addon.solver.embedding import RigidMotion
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.pipeline import Bake, finish, inbetweens, prepare
 from qc3d_addon.solver.prepared import PreparedMap
 from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.stretch import Stretch, StretchLaw
-from qc3d_addon.solver.surface_path import SurfacePath
 from qc3d_addon.solver.tetmesh import Floats, Ints
 from qc3d_addon.solver.topology import sides, unique_edges
 
@@ -141,11 +140,10 @@ class TestExtraTurns:
             assert not len(crossing_pairs(frame, self.FACES))
 
     def test_otherwise_what_is_back_in_its_place_is_held(self) -> None:
-        embedding = Embedding.of(KeyPair.checked(self.BAR, self.KEY, self.FACES))
         back = np.linalg.norm(self.KEY - self.BAR, axis=1) < 1e-6
         assert back[self.SHARES > 0.5].any()
-        np.testing.assert_array_equal(SurfacePath(embedding).still, back)
-        np.testing.assert_array_equal(SurfacePath(embedding, free_after_turns=True).still, self.SHARES == 0.0)
+        bake = baked(self.BAR, self.KEY, self.FACES, [0.5])
+        np.testing.assert_allclose(bake.frames[0][back], self.BAR[back], rtol=0.0, atol=1e-6)
 
     @pytest.mark.parametrize("extra", [-1, 0, 2])
     def test_a_loose_part_gets_full_turns(self, extra: int) -> None:

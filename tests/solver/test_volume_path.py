@@ -59,3 +59,46 @@ def test_what_turns_as_a_whole_inside_keeps_its_shape() -> None:
     stretch = polar_decomposition(mesh.jacobians(halfway)[inside]).stretch
     np.testing.assert_allclose(stretch, np.broadcast_to(np.eye(3), stretch.shape), rtol=0.0, atol=0.01)
     np.testing.assert_allclose(halfway[core], whirled(mesh.points, 0.5)[core], rtol=0.0, atol=0.01)
+
+
+@pytest.mark.parametrize("inside", [-1.0, 2.0])
+def test_reversed_and_nested_surfaces_weigh_as_much(inside: float) -> None:
+    mesh = jittered_grid(5, seed=3)
+    values = whirled(mesh.points, 0.6)
+    core = np.where(np.linalg.norm(mesh.centroids - 0.5, axis=1) < 0.25, 1.0, 0.0)
+    expected = path_of(mesh, values, core).at(0.4)
+    np.testing.assert_allclose(path_of(mesh, values, inside * core).at(0.4), expected, rtol=0.0, atol=1e-12)
+
+
+def test_nothing_inside() -> None:
+    mesh = jittered_grid(5, seed=4)
+    values = whirled(mesh.points, 0.6)
+    nowhere, everywhere = (path_of(mesh, values, np.full(len(mesh.tets), weight)).at(0.5) for weight in (0.0, 1.0))
+    np.testing.assert_allclose(nowhere, everywhere, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("turns", [1, -2])
+def test_a_twist_by_whole_turns_ends_where_none_does(turns: int) -> None:
+    # The same map, its middle turned on the way by whole turns more; only the way is another.
+    mesh = jittered_grid(8, seed=5)
+    values = whirled(mesh.points, 0.7)
+    core = np.linalg.norm(mesh.centroids - 0.5, axis=1) < 0.2
+    rotations = polar_decomposition(mesh.jacobians(values)).rotation
+    axis = np.array([0.0, 0.6, 0.8])
+    twist = np.where(core[:, None], (0.7 + 2.0 * np.pi * turns) * axis, 0.0)
+    swing = rotation_vectors(rotations @ rotation_matrices(-twist))
+    path = VolumePath(mesh, values, Turning(swing, twist), core.astype(np.float64), "linear")
+    np.testing.assert_allclose(path.at(0.0), mesh.points, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(path.at(1.0), values, rtol=0.0, atol=1e-11)
+    middle = np.linalg.norm(mesh.points - 0.5, axis=1) < 0.1
+    expected = 0.5 + (mesh.points - 0.5) @ rotation_matrices(0.5 * (0.7 + 2.0 * np.pi * turns) * axis[None])[0].T
+    np.testing.assert_allclose(path.at(0.5)[middle], expected[middle], rtol=0.0, atol=0.02)
+
+
+def test_close_times_give_close_maps() -> None:
+    mesh = jittered_grid(5, seed=6)
+    path = path_of(mesh, whirled(mesh.points, 0.8), np.ones(len(mesh.tets)))
+    values = np.stack([path.at(time) for time in np.linspace(0.0, 1.0, 17)])
+    steps = np.abs(np.diff(values, axis=0)).max(axis=(1, 2))
+    assert steps.max() < 1.5 * steps.mean()
+    assert np.abs(np.diff(values, n=2, axis=0)).max() < 2.0 * steps.mean() / 16.0

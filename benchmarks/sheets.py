@@ -23,6 +23,7 @@ SHOWN = (
     Pair("bar", "straight", "twist270"),
 )
 Y_UP = ("head", "horse", "wolf", "fox")
+HEIGHTS = {"bar": 280}  # pixels of a row; a column must hold its label
 TITLES = {"straight": "straight", "linear": "linear", "poisson": "Poisson", "arap": "ARAP", "natural": "natural"}
 
 
@@ -45,6 +46,6 @@ def save(results: Results, folder: Path) -> list[Path]:
             rows.append(Row(TITLES[method], faces, times, frames))
         if rows:
             path = folder / f"inbetweens_{pair.file}.png"
-            save_sheet(rows, "auto", 200, path)
+            save_sheet(rows, "auto", HEIGHTS.get(pair.file, 200), path)
             written.append(path)
     return written

@@ -10,7 +10,7 @@ from typing import Any
 
 from .catalogue import EXTRA_TURNS
 from .methods import METHODS
-from .verdict import CLASSICAL, RIVALRY, Verdict
+from .verdict import CLASSICAL, RIVALRY, Verdict, always_measure
 
 BEGIN = "<!-- begin: written by benchmarks/inbetweens.py -->"
 END = "<!-- end: written by benchmarks/inbetweens.py -->"
@@ -66,7 +66,7 @@ def health_table(verdicts: Sequence[Verdict], method: str = "natural") -> str:
             f"{report['residual']['max']:.1e}",
             "-" if worst["intersections"] is None else str(worst["intersections"]),
             "-" if worst["still_drift"] is None else f"{worst['still_drift']:.0e}",
-            f"{result['key_error']:.0e}",
+            f"{always_measure(result, 'key_error'):.0e}",
             f"{result['jerk']:.2f}",
             f"{result['seconds']:.0f}",
             "; ".join(verdict.misses(method)) or "all kept",

@@ -60,11 +60,14 @@ class Verdict:
 
 
 def always_measure(result: dict[str, Any], measure: str) -> float | None:
-    """A measure of a stored result by its name in the list of limits."""
+    """A measure of a stored result by its name in the list of limits.
+
+    The error at the keys is the one before QC3D puts the keys themselves in the place of the frames computed there.
+    """
+    report = result["details"].get("report")
     if measure == "key_error":
-        return float(result["key_error"])
+        return max(float(result["key_error"]), 0.0 if report is None else float(report["key_error"]))
     if measure == "volume_folds":
-        report = result["details"].get("report")
         return None if report is None else float(report["folds"]["map"] + sum(report["folds"]["frames"]))
     value = result["worst"][measure]
     return None if value is None else float(value)

@@ -24,7 +24,7 @@ LISTED = Pair("body", "rest", "t_pose", {"edge_excess_p99": 40.0, "volume_dev": 
 
 def figures(edge: float, volume: float | None, folds: int = 0, **more: float) -> dict[str, Any]:
     worst = {"edge_excess_p99": edge, "volume_dev": volume, "still_drift": 0.0, "intersections": 0}
-    made = {"folds": {"map": folds, "frames": [0, 0]}, "tetrahedra": 7, "residual": {"max": 0.0}}
+    made = {"folds": {"map": folds, "frames": [0, 0]}, "tetrahedra": 7, "key_error": 0.0, "residual": {"max": 0.0}}
     return {
         "worst": worst | more, "key_error": 0.0, "jerk": 0.1, "seconds": 1.0, "revision": "abc",
         "details": {"report": made},
@@ -49,6 +49,12 @@ def test_every_missed_limit_is_named() -> None:
         "edge_excess_p99", "intersections", "still_drift", "volume_dev", "volume_folds",
     ]  # fmt: skip
     assert verdict({"error": "natural: no", "worst": {}, "details": {}}).misses() == ["failed: natural: no"]
+
+
+def test_the_error_at_the_keys_is_the_one_before_they_are_put_in() -> None:
+    result = figures(0.0, 0.0)
+    result["details"]["report"]["key_error"] = 1e-3
+    assert verdict(result).misses() == ["key_error 0.001 > 1e-06"]
 
 
 def test_what_is_asked_to_turn_may_leave_its_place() -> None:

@@ -20,6 +20,10 @@ class MeshingError(QC3DError):
     """The cube could not be filled with tetrahedra."""
 
 
+class WorkerError(QC3DError):
+    """The process that does the work ended without a result."""
+
+
 class ReconstructionError(QC3DError):
     """A map cannot be rebuilt from its representation and boundary conditions."""
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .chain import join
 from .continuation import follow_path
@@ -60,11 +60,14 @@ class Bake:
         Positions in the keys' own coordinates.
     report : dict
         Engine, counts, folds, residuals, times: plain values that can be written as JSON.
+    measures : dict
+        Distortion of each frame at each vertex by the name of the measure, (k, n) each.
     """
 
     times: Floats
     frames: Floats
     report: dict[str, Any]
+    measures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 def finish(steps: Steps[T], on_progress: Callable[[Progress], None] | None = None) -> T:

@@ -4,13 +4,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
-import os
-import signal
 import subprocess
 import sys
-import sysconfig
 import tempfile
 import zipfile
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -19,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import MeshingError
+from .interpreter import interpreter
 from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .tet_quality import triangulate
 from .tetmesh import Floats, Ints, TetMesh
@@ -33,7 +30,7 @@ def unavailable_reason() -> str | None:
     """Why fTetWild cannot run here, as a clause, or None if it can; loads nothing."""
     if _wrapper() is None:
         return "pytetwild is not installed for this Python"
-    if _interpreter() is None:
+    if interpreter() is None:
         return "no Python interpreter to run it was found"
     return None
 
@@ -131,7 +128,7 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
         for key, array in arrays.items():
             np.save(folder / f"{key}.npy", array, allow_pickle=False)
         numpy_folder = Path(np.__file__).resolve().parent.parent
-        command = [_interpreter(), "-I", CHILD, _wrapper(), numpy_folder, folder, time_limit]
+        command = [interpreter(), "-I", CHILD, _wrapper(), numpy_folder, folder, time_limit]
         status, message = _run([str(part) for part in command], folder / "errors.txt", time_limit)
         if status is None:
             raise MeshingError(
@@ -151,33 +148,21 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
 
 def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
     """Exit status (None: killed at the time limit) and the last line written to standard error."""
-    options: dict[str, object]
-    if sys.platform == "win32":
-        options = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
-    else:
-        options = {"start_new_session": True}
+    # In the group of whoever waits for it: what ends that group, such as Ctrl-C or a cancelled bake, ends this too.
+    flags = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
     with open(errors, "wb") as stream:
-        process = subprocess.Popen(  # type: ignore[call-overload]
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, **options
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, creationflags=flags
         )
         try:
             status = process.wait(time_limit)
         except subprocess.TimeoutExpired:
             status = None
         finally:  # also when the user interrupts the wait
-            _kill_group(process)
+            process.kill()
+            process.wait()
     lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return status, lines[-1] if lines else ""
-
-
-def _kill_group(process: subprocess.Popen[bytes]) -> None:
-    """End the child and whatever it started; nothing happens if it has ended."""
-    if sys.platform == "win32":
-        process.kill()
-    else:
-        with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is gone
-            os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 def _wrapper() -> Path | None:
@@ -188,18 +173,4 @@ def _wrapper() -> Path | None:
             candidate = Path(location) / f"PyfTetWildWrapper{suffix}"
             if candidate.is_file():
                 return candidate
-    return None
-
-
-def _interpreter() -> Path | None:
-    """A Python like the running one; where Python is embedded, ``sys.executable`` may be the application."""
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    suffix = sysconfig.get_config_var("EXE") or ""
-    candidates = [Path(sys.executable)] if sys.executable else []
-    for folder in (Path(sys.prefix), Path(sys.base_prefix)):
-        for name in (f"python{version}", "python3", "python"):
-            candidates += [folder / "bin" / f"{name}{suffix}", folder / f"{name}{suffix}"]
-    for candidate in candidates:
-        if "python" in candidate.name.lower() and candidate.is_file() and os.access(candidate, os.X_OK):
-            return candidate
     return None

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One piece of work as plain arrays: which keys to go through, which maps are known, which frames are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import naming_pair
+from .keypair import KeyPair
+from .pipeline import Bake, Steps, chain_inbetweens, prepare
+from .settings import Settings
+from .storage import from_bytes, to_bytes
+from .tetmesh import Floats
+
+Ends = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What to compute, checked when it is made.
+
+    Parameters
+    ----------
+    pairs : dict
+        The pair of every two keys that follow each other, by their names.
+    through : tuple of str
+        Names of the keys from the first to the last.
+    settings : Settings
+    times : (k,)
+        Times of the frames, 0 the first key and 1 the last; empty where only the maps are wanted.
+    kept : dict
+        Stored maps, by the names of their keys, that need not be made again.
+    """
+
+    pairs: dict[Ends, KeyPair]
+    through: tuple[str, ...]
+    settings: Settings
+    times: Floats = field(default_factory=lambda: np.empty(0))
+    kept: dict[Ends, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def of_keys(
+        cls,
+        shapes: dict[str, NDArray[np.floating]],
+        faces: NDArray[np.integer],
+        edges: NDArray[np.integer],
+        through: Sequence[str],
+        settings: Settings,
+        times: Floats | None = None,
+        kept: dict[Ends, bytes] | None = None,
+    ) -> Task:
+        """A task from the shapes (n, 3) of the keys by name, the triangles (m, 3) and the loose edges (e, 2).
+
+        Raises
+        ------
+        InputError
+            If two keys that follow each other cannot be used.
+        """
+        pairs = {}
+        for ends in pairwise(through):
+            with naming_pair(*ends, through):
+                pairs[ends] = KeyPair.checked(shapes[ends[0]], shapes[ends[1]], faces, edges)
+        wanted = np.empty(0) if times is None else np.asarray(times, dtype=np.float64)
+        return cls(pairs, tuple(through), settings, wanted, kept or {})
+
+    @property
+    def new_maps(self) -> int:
+        """How many maps have to be made."""
+        return len(self.pairs) - len(self.kept)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of a task.
+
+    Parameters
+    ----------
+    maps : dict
+        The stored map of every pair by the names of its keys.
+    bake : Bake or None
+        The frames; None where none were wanted.
+    """
+
+    maps: dict[Ends, bytes]
+    bake: Bake | None
+
+
+def carry_out(task: Task) -> Steps[Outcome]:
+    """Make the maps that are missing, then the frames.
+
+    Raises
+    ------
+    QC3DError
+        If a kept map is damaged or belongs to other keys, a map cannot be made, or a time is outside 0..1.
+    """
+    prepared, maps = {}, {}
+    names = list(dict.fromkeys(task.through))
+    for ends, pair in task.pairs.items():
+        with naming_pair(*ends, names):
+            data = task.kept.get(ends)
+            if data is None:
+                prepared[ends] = yield from prepare(pair, task.settings)
+                data = to_bytes(prepared[ends])
+            else:
+                prepared[ends] = from_bytes(data, pair)
+        maps[ends] = data
+    bake = None
+    if len(task.times):
+        bake = yield from chain_inbetweens(
+            [prepared[ends] for ends in pairwise(task.through)], task.times, task.settings
+        )
+    return Outcome(maps, bake)

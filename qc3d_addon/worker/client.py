@@ -1,0 +1,237 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs a task in a child process: asks how far it is, stops it, and turns every way to fail into one typed error."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..solver import errors
+from ..solver.errors import InputError, QC3DError, WorkerError
+from ..solver.interpreter import interpreter
+from ..solver.pipeline import Progress
+from ..solver.task import Outcome, Task
+from .exchange import read_outcome, write_task
+
+CHILD = Path(__file__).with_name("task_child.py")
+_LIBRARIES = ("numpy", "scipy", "pytetwild")
+_POLL_SECONDS = 0.05
+_LONGEST_MESSAGE = 1_000_000
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a child process may use.
+
+    Parameters
+    ----------
+    seconds
+        Time after which it is stopped.
+    memory_mb
+        Most memory it may allocate, in megabytes; 0 for no limit. Enforced on Linux only.
+    """
+
+    seconds: float = 3600.0
+    memory_mb: int = 0
+
+
+class Worker:
+    """A task at work in a child process. Use it from one thread, and call ``close`` at the end, whatever happened.
+
+    Raises
+    ------
+    WorkerError
+        If the child cannot be started.
+    """
+
+    def __init__(self, task: Task, limits: Limits | None = None) -> None:
+        self._task = task
+        self._limits = limits or Limits()
+        self._progress: Progress | None = None
+        self._ending: dict[str, Any] | None = None
+        self._folder = tempfile.TemporaryDirectory(prefix="qc3d-", ignore_cleanup_errors=True)
+        try:
+            write_task(Path(self._folder.name), task)
+            self._errors = Path(self._folder.name) / "errors.txt"
+            self._process = self._start()
+        except OSError as error:
+            self._folder.cleanup()
+            raise WorkerError(f"The work cannot be started in a process of its own: {error}.") from error
+        except WorkerError:
+            self._folder.cleanup()
+            raise
+        self._deadline = clock.monotonic() + self._limits.seconds
+        self._reader = threading.Thread(target=self._read_messages, daemon=True)
+        self._reader.start()
+
+    @property
+    def progress(self) -> Progress | None:
+        """The newest progress; None before the first."""
+        return self._progress
+
+    def poll(self) -> Outcome | None:
+        """The outcome when it is there, None while the work goes on.
+
+        Raises
+        ------
+        QC3DError
+            The error that ended the work, a WorkerError where the process ended by itself or by its limits.
+        """
+        if self._process.poll() is None:
+            if clock.monotonic() > self._deadline:
+                self.close()
+                raise WorkerError(
+                    f"The work was stopped after its time limit of {self._limits.seconds:g} s; allow it more in the "
+                    "add-on's preferences, or choose a lower quality."
+                )
+            return None
+        self._reader.join()
+        try:
+            return self._result()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop the child if it still works, and remove its files; nothing happens the second time."""
+        _kill(self._process)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        self._reader.join()
+        self._process.stdout.close()
+        self._folder.cleanup()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        python = interpreter()
+        if python is None:
+            raise WorkerError("No Python interpreter was found to work in; install Blender with its own Python.")
+        package = Path(__file__).resolve().parent.parent
+        memory = self._limits.memory_mb * 2**20
+        command = [python, "-I", CHILD, package, self._folder.name, memory, *_library_folders()]
+        flags = 0
+        if sys.platform == "win32":
+            flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
+        with open(self._errors, "wb") as stream:
+            return subprocess.Popen(
+                [str(part) for part in command],
+                stdin=subprocess.PIPE,  # never written to: its end tells the child that this process is gone
+                stdout=subprocess.PIPE,
+                stderr=stream,
+                creationflags=flags,
+                start_new_session=sys.platform != "win32",
+            )
+
+    def _read_messages(self) -> None:
+        """Keep the newest progress and the message that ends the work, until the child closes its end."""
+        stream = self._process.stdout
+        assert stream is not None
+        rest = b""
+        while chunk := os.read(stream.fileno(), 65536):
+            *whole, rest = (rest + chunk).split(b"\0")
+            for text in whole:
+                self._take(text)
+            if len(rest) > _LONGEST_MESSAGE:
+                return
+
+    def _take(self, text: bytes) -> None:
+        try:
+            message = json.loads(text)
+            if "progress" in message:
+                stage, fraction = message["progress"]
+                self._progress = Progress(str(stage), float(fraction))
+            else:
+                self._ending = dict(message)
+        except (ValueError, TypeError):
+            return  # not a message of ours; how the process ended tells the rest
+
+    def _result(self) -> Outcome:
+        ending, status = self._ending, self._process.returncode
+        if ending is not None and "error" in ending:
+            kind, sentence = ending["error"]
+            if kind == "MemoryError":
+                raise WorkerError(_OUT_OF_MEMORY)
+            known = getattr(errors, str(kind), None)
+            is_ours = isinstance(known, type) and issubclass(known, QC3DError)
+            raise (known if is_ours else WorkerError)(str(sentence))
+        if ending is None or status != 0:
+            raise WorkerError(_how_it_ended(status, self._errors))
+        try:
+            return read_outcome(Path(self._folder.name), self._task)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+            raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
+
+
+_OUT_OF_MEMORY = "There is not enough memory; use fewer in-betweens, a lower quality or a smaller mesh."
+
+
+def run(task: Task, on_progress: Callable[[Progress], None] | None = None, limits: Limits | None = None) -> Outcome:
+    """Carry out a task in a child process and wait for it.
+
+    Raises
+    ------
+    QC3DError
+        As ``Worker.poll``.
+    """
+    worker = Worker(task, limits)
+    shown = None
+    try:
+        while True:
+            outcome = worker.poll()
+            if on_progress is not None and worker.progress is not None and worker.progress != shown:
+                shown = worker.progress
+                on_progress(shown)
+            if outcome is not None:
+                return outcome
+            clock.sleep(_POLL_SECONDS)
+    finally:
+        worker.close()
+
+
+def _library_folders() -> list[Path]:
+    """The folders that the libraries are in, found without importing them."""
+    folders = []
+    for name in _LIBRARIES:
+        spec = importlib.util.find_spec(name)
+        if spec is not None and spec.origin is not None:
+            folders.append(Path(spec.origin).resolve().parent.parent)
+        elif name != "pytetwild":
+            raise InputError(f"{name} is not installed for this Python; install the extension again.")
+    return list(dict.fromkeys(folders))
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End the child and whatever it started."""
+    if process.poll() is None:
+        if sys.platform == "win32":
+            subprocess.run(["taskkill", "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
+            process.kill()
+        else:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _how_it_ended(status: int, errors_file: Path) -> str:
+    lines = errors_file.read_text(encoding="utf-8", errors="replace").strip().splitlines() if errors_file.exists() else []
+    if status < 0:
+        name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
+        reason = "; memory may have run out" if -status == signal.SIGKILL else ""
+        how = f"was ended by {name}{reason}"
+    else:
+        how = f"ended without a result (exit status {status})"
+    last = f" Its last words: {lines[-1][:300]}" if lines else ""
+    return f"The process that does the work {how}; nothing was changed. Try again, with a lower quality if need be.{last}"

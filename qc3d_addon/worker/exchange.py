@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A task and its outcome as files of one folder: arrays as .npy and .npz without pickles, plain values as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..solver.keypair import KeyPair
+from ..solver.pipeline import Bake
+from ..solver.settings import Settings
+from ..solver.task import Outcome, Task
+
+_TASK, _OUTCOME = "task.json", "outcome.json"
+
+
+def write_task(folder: Path, task: Task) -> None:
+    """Put a task into an empty folder."""
+    for number, (ends, pair) in enumerate(task.pairs.items()):
+        np.savez(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
+        if ends in task.kept:
+            (folder / f"kept{number}.map").write_bytes(task.kept[ends])
+    np.save(folder / "times.npy", task.times, allow_pickle=False)
+    _write_json(
+        folder / _TASK, {"ends": list(task.pairs), "through": task.through, "settings": asdict(task.settings)}
+    )
+
+
+def read_task(folder: Path) -> Task:
+    """The task that ``write_task`` put there."""
+    header = _read_json(folder / _TASK)
+    pairs, kept = {}, {}
+    for number, (first, second) in enumerate(header["ends"]):
+        with np.load(folder / f"pair{number}.npz", allow_pickle=False) as stored:
+            pairs[first, second] = KeyPair(*(stored[name] for name in ("key0", "key1", "faces", "edges")))
+        path = folder / f"kept{number}.map"
+        if path.exists():
+            kept[first, second] = path.read_bytes()
+    times = np.load(folder / "times.npy", allow_pickle=False)
+    return Task(pairs, tuple(header["through"]), Settings(**header["settings"]), times, kept)
+
+
+def write_outcome(folder: Path, outcome: Outcome) -> None:
+    """Put what came of the task beside it."""
+    for number, data in enumerate(outcome.maps.values()):
+        (folder / f"made{number}.map").write_bytes(data)
+    report = None
+    if outcome.bake is not None:
+        arrays = {"times": outcome.bake.times, "frames": outcome.bake.frames}
+        np.savez(folder / "bake.npz", **arrays, **{f"measure {k}": v for k, v in outcome.bake.measures.items()})
+        report = outcome.bake.report
+    _write_json(folder / _OUTCOME, {"ends": list(outcome.maps), "report": report})
+
+
+def read_outcome(folder: Path, task: Task) -> Outcome:
+    """What ``write_outcome`` put there.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If it is not there whole, or not what the task asked for.
+    """
+    header = _read_json(folder / _OUTCOME)
+    maps = {
+        (first, second): (folder / f"made{number}.map").read_bytes()
+        for number, (first, second) in enumerate(header["ends"])
+    }
+    if maps.keys() != task.pairs.keys():
+        raise ValueError("the maps belong to other keys")
+    if not len(task.times):
+        return Outcome(maps, None)
+    with np.load(folder / "bake.npz", allow_pickle=False) as stored:
+        times, frames = stored["times"], stored["frames"]
+        measures = {name.removeprefix("measure "): stored[name] for name in stored.files if name.startswith("measure ")}
+    vertices = len(next(iter(task.pairs.values())).key0)
+    if not np.array_equal(times, task.times) or frames.shape != (len(times), vertices, 3):
+        raise ValueError("the frames are not those asked for")
+    if not np.isfinite(frames).all():
+        raise ValueError("a frame has positions that are not finite")
+    return Outcome(maps, Bake(times, frames, dict(header["report"]), measures))
+
+
+def _write_json(path: Path, values: dict[str, Any]) -> None:
+    path.write_text(json.dumps(values), encoding="utf-8")
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return values

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carry out one task in a process of its own, started by :mod:`qc3d_addon.worker.client`::
+
+    python -I task_child.py PACKAGE FOLDER MEMORY LIBRARIES...
+
+PACKAGE is the folder of this package, whatever its name there; FOLDER holds the task and takes the outcome; MEMORY is
+the most that this process may allocate, in bytes, 0 for no limit; LIBRARIES are the folders to find numpy, scipy and
+pytetwild in. Messages go to standard output, each a JSON object that ends with a zero byte: ``{"progress": [stage,
+fraction]}`` while it works, and at the end ``{"done": true}`` or ``{"error": [kind, sentence]}``. When standard input
+closes, whoever started this is gone, and so is this.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import json
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Any, BinaryIO
+
+
+def main(arguments: list[str]) -> None:
+    package, folder, memory, libraries = Path(arguments[0]), Path(arguments[1]), int(arguments[2]), arguments[3:]
+    # Native code may write to standard output; its text must not end up among the messages.
+    messages = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    sys.path += [library for library in libraries if library not in sys.path]
+    name = _load(package)
+    errors = importlib.import_module(f"{name}.solver.errors")
+    try:
+        task = importlib.import_module(f"{name}.solver.task")
+        exchange = importlib.import_module(f"{name}.worker.exchange")
+        _limit_memory(memory)  # after the libraries are there: OpenBLAS waits forever for memory it does not get
+        steps = task.carry_out(exchange.read_task(folder))
+        while True:
+            try:
+                progress = next(steps)
+            except StopIteration as stop:
+                exchange.write_outcome(folder, stop.value)
+                break
+            _send(messages, {"progress": list(progress)})
+    except errors.QC3DError as error:
+        _send(messages, {"error": [type(error).__name__, str(error)]})
+    except MemoryError:
+        _send(messages, {"error": ["MemoryError", ""]})
+    else:
+        _send(messages, {"done": True})
+
+
+def _load(package: Path) -> str:
+    """Import the package from its folder; the name it goes by here."""
+    name = "qc3d_child"
+    spec = importlib.util.spec_from_file_location(
+        name, package / "__init__.py", submodule_search_locations=[str(package)]
+    )
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{package} is not a package")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return name
+
+
+def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
+    messages.write(json.dumps(message).encode() + b"\0")
+    messages.flush()
+
+
+def _end_with_parent() -> None:
+    """Wait until standard input closes, then end this process and what it started."""
+    with contextlib.suppress(OSError):
+        while os.read(0, 4096):
+            pass
+    if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
+        os.killpg(os.getpid(), signal.SIGKILL)
+    os._exit(1)
+
+
+def _limit_memory(limit: int) -> None:
+    """Let allocations beyond the limit fail, where the system can do that."""
+    if limit > 0 and sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -4,6 +4,8 @@
 #   make demo     bake the demo file; the results are left in demo/
 #   make test     everything: environment, ruff, mypy, pytest
 #   make assets   make the demo files again with the script that made them
+#   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
+#                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python
 #
 # PYTHON=python3.13 chooses the interpreter; the default is the first of 3.11 and 3.13 that really runs.
 
@@ -15,7 +17,7 @@ endif
 VENV := .venv-$(VERSION)
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint assets clean
+.PHONY: demo test lint assets extension clean
 
 KEYS := --object Arm --from Basis --to "Bend and twist"
 
@@ -39,6 +41,10 @@ lint: $(VENV)/installed
 assets: $(VENV)/installed
 	$(BIN)/python assets/make_assets.py
 
+extension: $(VENV)/installed
+	$(BIN)/python tools/build_extension.py $(addprefix --platform ,$(PLATFORM)) \
+	    $(addprefix --extra-python ,$(EXTRA_PYTHON))
+
 $(VENV)/installed: pyproject.toml blender_manifest.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
@@ -48,4 +54,4 @@ $(VENV)/installed: pyproject.toml blender_manifest.toml
 	touch $@
 
 clean:
-	rm -rf .venv-* demo
+	rm -rf .venv-* .wheels demo dist

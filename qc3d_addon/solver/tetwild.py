@@ -127,9 +127,8 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
         folder = Path(name)
         for key, array in arrays.items():
             np.save(folder / f"{key}.npy", array, allow_pickle=False)
-        numpy_folder = Path(np.__file__).resolve().parent.parent
-        command = [interpreter(), "-I", CHILD, _wrapper(), numpy_folder, folder, time_limit]
-        status, message = _run([str(part) for part in command], folder / "errors.txt", time_limit)
+        command = [*load_command(), str(folder), str(time_limit)]
+        status, message = _run(command, folder / "errors.txt", time_limit)
         if status is None:
             raise MeshingError(
                 f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
@@ -144,6 +143,15 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
                 return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
         except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
             raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
+
+
+def load_command() -> list[str]:
+    """The command that loads fTetWild in a child process and does no more: its exit status is 0 where that works.
+
+    Only where ``unavailable_reason()`` is None.
+    """
+    numpy_folder = Path(np.__file__).resolve().parent.parent
+    return [str(part) for part in (interpreter(), "-I", CHILD, _wrapper(), numpy_folder)]
 
 
 def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:

@@ -10,7 +10,7 @@ files hold::
 
 WRAPPER is the file of pytetwild's compiled module, loaded on its own because the package around it needs pyvista;
 NUMPY is the folder that holds numpy; FOLDER is where the input's .npy files lie and ``output.npz`` goes; SECONDS is
-a limit that holds even if nobody is left to enforce it.
+a limit that holds even if nobody is left to enforce it. Without FOLDER and SECONDS it loads the module and no more.
 """
 
 from __future__ import annotations
@@ -25,10 +25,14 @@ from types import ModuleType
 
 
 def main(arguments: list[str]) -> None:
-    wrapper, numpy_folder, folder, seconds = Path(arguments[0]), arguments[1], Path(arguments[2]), float(arguments[3])
+    wrapper, numpy_folder = Path(arguments[0]), arguments[1]
+    sys.path.append(numpy_folder)
+    if len(arguments) == 2:
+        _load(wrapper)
+        return
+    folder, seconds = Path(arguments[2]), float(arguments[3])
     if hasattr(signal, "alarm"):
         signal.alarm(math.ceil(seconds) + 5)
-    sys.path.append(numpy_folder)
     import numpy as np
 
     arrays = {file.stem: np.load(file, allow_pickle=False) for file in folder.glob("*.npy")}

@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which meshing engine will do the work here, found out without loading anything into this process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from ..solver import tetwild
+
+_TAKES_OVER = "The engine delaunay does the work here, since tetwild cannot: {}."
+
+_probe: subprocess.Popen[bytes] | None = None
+_asked = False
+_notice: str | None = None
+
+
+def engine_notice() -> str | None:
+    """The sentence to show where the engine ``auto`` means delaunay, or None where fTetWild works.
+
+    Quick enough for a panel: the first call starts a child process that only loads fTetWild (a wheel made for newer
+    systems is found out no other way), later calls look whether it has ended. Until then the answer is None.
+    """
+    global _asked, _notice, _probe
+    if not _asked:
+        _asked = True
+        reason = tetwild.unavailable_reason()
+        if reason is None:
+            try:
+                _probe = _start()
+            except OSError as error:
+                reason = f"no process can be started ({error})"
+        if reason is not None:
+            _notice = _TAKES_OVER.format(reason)
+    if _probe is not None and _probe.poll() is not None:
+        if _probe.returncode != 0:
+            _notice = _TAKES_OVER.format("its compiled module does not load on this system")
+        _probe = None
+    return _notice
+
+
+def forget() -> None:
+    """End the child process if it still runs, so that nothing is left behind; the next call asks again."""
+    global _asked, _notice, _probe
+    if _probe is not None:
+        _probe.kill()
+        _probe.wait()
+    _asked, _notice, _probe = False, None, None
+
+
+def _start() -> subprocess.Popen[bytes]:
+    nowhere = subprocess.DEVNULL
+    flags = 0
+    if sys.platform == "win32":
+        flags = subprocess.CREATE_NO_WINDOW
+    return subprocess.Popen(tetwild.load_command(), stdin=nowhere, stdout=nowhere, stderr=nowhere, creationflags=flags)

@@ -43,9 +43,8 @@ def test_a_module_that_does_not_load_is_said(monkeypatch: pytest.MonkeyPatch, tm
     broken = tmp_path / "PyfTetWildWrapper.so"
     broken.write_bytes(b"for another system")
     monkeypatch.setattr(tetwild, "_wrapper", lambda: broken)
-    assert settled() == (
-        "The engine delaunay does the work here, since tetwild cannot: its compiled module does not load on this system."
-    )
+    reason = "its compiled module does not load on this system"
+    assert settled() == f"The engine delaunay does the work here, since tetwild cannot: {reason}."
 
 
 def test_a_missing_module_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

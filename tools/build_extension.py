@@ -45,6 +45,10 @@ class BuildError(Exception):
     """Why there is no package, as a sentence."""
 
 
+class UnreachableError(BuildError):
+    """The package registry cannot be reached."""
+
+
 @dataclass(frozen=True)
 class Wheel:
     """One line of the pins.
@@ -138,7 +142,7 @@ def fetch(wheel: Wheel) -> Path:
     if not path.exists():
         package, version, python, abi, platform = wheel.parts
         tags = [f"--platform={tag}" for tag in platform.split(".")]
-        only = ["--no-deps", "--only-binary=:all:", "--require-hashes", "--implementation=cp"]
+        only = ["--no-deps", "--only-binary=:all:", "--require-hashes", "--implementation=cp", "--retries=1"]
         with tempfile.TemporaryDirectory() as folder:
             requirement = Path(folder) / "requirement.txt"
             requirement.write_text(f"{package}=={version} --hash=sha256:{wheel.sha256}\n", encoding="utf-8")
@@ -146,8 +150,10 @@ def fetch(wheel: Wheel) -> Path:
             command += [f"--abi={abi}", *tags, f"--dest={CACHE}", f"--requirement={requirement}"]
             run = subprocess.run(command, capture_output=True, text=True)
         if run.returncode != 0 or not path.exists():
+            unreachable = re.search(r"connection|max retries|timed out|resolution", run.stderr, re.IGNORECASE)
             reason = (run.stderr.strip() or "pip brought another file").splitlines()[-1]
-            raise BuildError(f"{wheel.file} cannot be downloaded: {reason}")
+            kind = UnreachableError if unreachable else BuildError
+            raise kind(f"{wheel.file} cannot be downloaded: {reason}")
     if hashlib.sha256(path.read_bytes()).hexdigest() != wheel.sha256:
         raise BuildError(f"{path} is not the wheel that {PINS.name} names; remove it, so that it is downloaded again.")
     return path

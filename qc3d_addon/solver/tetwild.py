@@ -157,7 +157,9 @@ def load_command() -> list[str]:
 def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
     """Exit status (None: killed at the time limit) and the last line written to standard error."""
     # In the group of whoever waits for it: what ends that group, such as Ctrl-C or a cancelled bake, ends this too.
-    flags = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
+    flags = 0
+    if sys.platform == "win32":
+        flags = subprocess.CREATE_NO_WINDOW
     with open(errors, "wb") as stream:
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, creationflags=flags

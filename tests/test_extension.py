@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os
 import shutil
 import sys
 import tomllib
@@ -216,6 +217,23 @@ def test_a_wheel_that_is_not_the_pinned_one_is_refused(small_wheels: Path, tmp_p
         archive.writestr("scipy/more.py", "")
     with pytest.raises(BuildError, match="is not the wheel that"):
         build_extension.build("linux-x64", tmp_path / "dist", [])
+
+
+def test_a_registry_out_of_reach_is_told_apart(
+    small_wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (small_wheels / SCIPY[0]).unlink()
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")  # nothing listens there
+    monkeypatch.delenv("PIP_EXTRA_INDEX_URL", raising=False)
+    monkeypatch.delenv("PIP_FIND_LINKS", raising=False)
+    with pytest.raises(build_extension.UnreachableError, match="the package registry cannot be reached"):
+        build_extension.build("linux-x64", tmp_path / "dist", [])
+    monkeypatch.delenv("PIP_INDEX_URL")
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    with pytest.raises(BuildError, match="cannot be downloaded: ERROR: No matching distribution") as error:
+        build_extension.build("linux-x64", tmp_path / "dist", [])
+    assert not isinstance(error.value, build_extension.UnreachableError)
 
 
 @pytest.mark.usefixtures("small_wheels")

@@ -88,7 +88,7 @@ def main(argv: list[str] | None = None) -> int:
         action="append",
         default=[],
         metavar="3.X",
-        help="a test build with wheels for one more Python, where there are any",
+        help="a test build with wheels for one more Python, which the pins must have",
     )
     parser.add_argument("--output", type=Path, default=REPOSITORY / "dist", help="the folder (default: dist)")
     arguments = parser.parse_args(argv)
@@ -150,10 +150,10 @@ def fetch(wheel: Wheel) -> Path:
             command += [f"--abi={abi}", *tags, f"--dest={CACHE}", f"--requirement={requirement}"]
             run = subprocess.run(command, capture_output=True, text=True)
         if run.returncode != 0 or not path.exists():
-            unreachable = re.search(r"connection|max retries|timed out|resolution", run.stderr, re.IGNORECASE)
             reason = (run.stderr.strip() or "pip brought another file").splitlines()[-1]
-            kind = UnreachableError if unreachable else BuildError
-            raise kind(f"{wheel.file} cannot be downloaded: {reason}")
+            if re.search(r"connection|timed out|resolution", run.stderr, re.IGNORECASE):
+                raise UnreachableError(f"{wheel.file} cannot be downloaded: the package registry cannot be reached.")
+            raise BuildError(f"{wheel.file} cannot be downloaded: {reason}")
     if hashlib.sha256(path.read_bytes()).hexdigest() != wheel.sha256:
         raise BuildError(f"{path} is not the wheel that {PINS.name} names; remove it, so that it is downloaded again.")
     return path

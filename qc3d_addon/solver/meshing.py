@@ -13,7 +13,8 @@ from .errors import MeshingError
 from .sampling import RESOLUTIONS
 from .settings import Settings
 from .tetmesh import Floats, Ints, TetMesh
-from .tetwild import MARGIN, tetwild_mesh, unavailable_reason
+from .tetwild import MARGIN, tetwild_mesh
+from .tetwild_loading import unavailable_reason
 
 SMALLEST_VOLUME = 1e-14  # of the cube's: a tetrahedron of this size and edges of 0.01 has angles near rounding
 

@@ -4,35 +4,23 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 import tempfile
 import zipfile
-from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import numpy as np
 
 from .errors import MeshingError
-from .interpreter import interpreter
 from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .tet_quality import triangulate
 from .tetmesh import Floats, Ints, TetMesh
+from .tetwild_loading import load_command, unavailable_reason
 
 MARGIN = 0.14  # the surface keeps this far from the cube's faces; also the longest edge that fTetWild aims at
-CHILD = Path(__file__).resolve().parent.parent / "worker" / "tetwild_child.py"
 
 _EDGE_FACTOR = 1.6  # fTetWild's ideal edges per distance between Poisson-disk samples, for equally fine meshes
-
-
-def unavailable_reason() -> str | None:
-    """Why fTetWild cannot run here, as a clause, or None if it can; loads nothing."""
-    if _wrapper() is None:
-        return "pytetwild is not installed for this Python"
-    if interpreter() is None:
-        return "no Python interpreter to run it was found"
-    return None
 
 
 def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int, time_limit: float) -> TetMesh:
@@ -145,15 +133,6 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
             raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
 
 
-def load_command() -> list[str]:
-    """The command that loads fTetWild in a child process and does no more: its exit status is 0 where that works.
-
-    Only where ``unavailable_reason()`` is None.
-    """
-    numpy_folder = Path(np.__file__).resolve().parent.parent
-    return [str(part) for part in (interpreter(), "-I", CHILD, _wrapper(), numpy_folder)]
-
-
 def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
     """Exit status (None: killed at the time limit) and the last line written to standard error."""
     # In the group of whoever waits for it: what ends that group, such as Ctrl-C or a cancelled bake, ends this too.
@@ -173,14 +152,3 @@ def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | Non
             process.wait()
     lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return status, lines[-1] if lines else ""
-
-
-def _wrapper() -> Path | None:
-    """The file of pytetwild's compiled module, found without importing the package, which needs pyvista."""
-    spec = importlib.util.find_spec("pytetwild")
-    for location in (spec.submodule_search_locations or ()) if spec else ():
-        for suffix in EXTENSION_SUFFIXES:
-            candidate = Path(location) / f"PyfTetWildWrapper{suffix}"
-            if candidate.is_file():
-                return candidate
-    return None

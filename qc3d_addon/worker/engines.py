@@ -7,7 +7,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from ..solver import tetwild
+from ..solver import tetwild_loading
 
 _TAKES_OVER = "The engine delaunay does the work here, since tetwild cannot: {}."
 
@@ -25,7 +25,7 @@ def engine_notice() -> str | None:
     global _asked, _notice, _probe
     if not _asked:
         _asked = True
-        reason = tetwild.unavailable_reason()
+        reason = tetwild_loading.unavailable_reason()
         if reason is None:
             try:
                 _probe = _start()
@@ -54,4 +54,6 @@ def _start() -> subprocess.Popen[bytes]:
     flags = 0
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW
-    return subprocess.Popen(tetwild.load_command(), stdin=nowhere, stdout=nowhere, stderr=nowhere, creationflags=flags)
+    return subprocess.Popen(
+        tetwild_loading.load_command(), stdin=nowhere, stdout=nowhere, stderr=nowhere, creationflags=flags
+    )

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qc3d_addon.solver import meshing, tetwild
+from qc3d_addon.solver import meshing, tetwild_loading
 from qc3d_addon.solver.errors import MeshingError
 from qc3d_addon.solver.location import interpolation_matrix
 from qc3d_addon.solver.meshing import FilledCube, engine_available, fill_cube, require_filled_cube
 from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.tet_quality import smallest_dihedral_angles
 from qc3d_addon.solver.tetmesh import OPPOSITE_FACES, Floats, Ints, TetMesh
+from qc3d_addon.solver.tetwild_loading import unavailable_reason
 
 from .meshes import icosphere, jittered_grid, kuhn_grid
 
@@ -22,7 +23,7 @@ ENGINES = [
     "delaunay",
     pytest.param(
         "tetwild",
-        marks=pytest.mark.skipif(not engine_available("tetwild"), reason=f"tetwild: {tetwild.unavailable_reason()}"),
+        marks=pytest.mark.skipif(not engine_available("tetwild"), reason=f"tetwild: {unavailable_reason()}"),
     ),
 ]
 
@@ -164,7 +165,7 @@ def test_auto_rejects_a_mesh_with_a_hole(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_without_pytetwild(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tetwild, "_wrapper", lambda: None)
+    monkeypatch.setattr(tetwild_loading, "_wrapper", lambda: None)
     assert not engine_available("tetwild")
     assert engine_available("delaunay")
     assert engine_available("auto")
@@ -175,7 +176,7 @@ def test_without_pytetwild(monkeypatch: pytest.MonkeyPatch) -> None:
         fill(*icosphere(1, 0.1), "tetwild")
 
 
-@pytest.mark.skipif(not engine_available("tetwild"), reason=f"tetwild: {tetwild.unavailable_reason()}")
+@pytest.mark.skipif(not engine_available("tetwild"), reason=f"tetwild: {unavailable_reason()}")
 def test_the_time_limit() -> None:
     filled = fill(*icosphere(2), "auto", mesh_time_limit=0.05)
     assert filled.engine == "delaunay"

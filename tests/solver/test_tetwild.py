@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qc3d_addon.solver import tetwild
+from qc3d_addon.solver import tetwild, tetwild_loading
 from qc3d_addon.solver.errors import MeshingError
 from qc3d_addon.solver.interpreter import interpreter
 from qc3d_addon.solver.sampling import RESOLUTIONS
@@ -27,8 +27,8 @@ ARRAYS = {"points": np.zeros((4, 3))}
 def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A file that plays the child program, with ``folder`` set; temporary folders are made beside it."""
     script = tmp_path / "child.py"
-    monkeypatch.setattr(tetwild, "CHILD", script)
-    monkeypatch.setattr(tetwild, "_wrapper", lambda: tmp_path / "wrapper")
+    monkeypatch.setattr(tetwild_loading, "CHILD", script)
+    monkeypatch.setattr(tetwild_loading, "_wrapper", lambda: tmp_path / "wrapper")
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tetwild.tempfile, "tempdir", str(tmp_path / "temporary"))
     return script
@@ -118,8 +118,8 @@ def test_an_interrupt_ends_the_child(stand_in: Path, tmp_path: Path, monkeypatch
 
 
 def test_a_missing_package_is_an_error_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tetwild.importlib.util, "find_spec", lambda name: None)
-    assert tetwild.unavailable_reason() is not None
+    monkeypatch.setattr(tetwild_loading.importlib.util, "find_spec", lambda name: None)
+    assert tetwild_loading.unavailable_reason() is not None
     with pytest.raises(MeshingError, match="pytetwild is not installed"):
         tetwild.run_child(ARRAYS, 20.0)
 
@@ -173,15 +173,19 @@ def test_clustering_of_degenerate_triangles() -> None:
         assert triangles.shape == (0, 3)
 
 
-@pytest.mark.skipif(tetwild.unavailable_reason() is not None, reason=f"tetwild: {tetwild.unavailable_reason()}")
+@pytest.mark.skipif(
+    tetwild_loading.unavailable_reason() is not None, reason=f"tetwild: {tetwild_loading.unavailable_reason()}"
+)
 def test_the_child_program_reports_bad_arguments_in_one_line(tmp_path: Path) -> None:
-    command = [sys.executable, "-I", str(tetwild.CHILD), str(tmp_path / "none.so"), "", str(tmp_path), "10"]
+    command = [sys.executable, "-I", str(tetwild_loading.CHILD), str(tmp_path / "none.so"), "", str(tmp_path), "10"]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 1
     assert len(result.stderr.strip().splitlines()) == 1
 
 
-@pytest.mark.skipif(tetwild.unavailable_reason() is not None, reason=f"tetwild: {tetwild.unavailable_reason()}")
+@pytest.mark.skipif(
+    tetwild_loading.unavailable_reason() is not None, reason=f"tetwild: {tetwild_loading.unavailable_reason()}"
+)
 def test_the_cube_is_exact(tmp_path: Path) -> None:
     mesh = tetwild.tetwild_mesh(*icosphere(2, 0.15), RESOLUTIONS["draft"], 0, 60.0)
     assert mesh.points.min() == 0.0

@@ -27,7 +27,7 @@ from ..solver.task import Outcome, Task
 from .exchange import read_outcome, write_task
 
 CHILD = Path(__file__).with_name("task_child.py")
-_LIBRARIES = ("numpy", "scipy", "pytetwild")
+_LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may hold a scipy that is not the bundled one
 _POLL_SECONDS = 0.05
 _LONGEST_MESSAGE = 1_000_000
 
@@ -121,7 +121,8 @@ class Worker:
             raise WorkerError("No Python interpreter was found to work in; install Blender with its own Python.")
         package = Path(__file__).resolve().parent.parent
         memory = self._limits.memory_mb * 2**20
-        command = [python, "-I", CHILD, package, self._folder.name, memory, *_library_folders()]
+        # Without the interpreter's own packages: the child is to use the libraries that this process would.
+        command = [python, "-I", "-S", CHILD, package, self._folder.name, memory, *_library_folders()]
         flags = 0
         if sys.platform == "win32":
             flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
@@ -226,7 +227,8 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 
 def _how_it_ended(status: int, errors_file: Path) -> str:
-    lines = errors_file.read_text(encoding="utf-8", errors="replace").strip().splitlines() if errors_file.exists() else []
+    text = errors_file.read_text(encoding="utf-8", errors="replace") if errors_file.exists() else ""
+    lines = text.strip().splitlines()
     if status < 0:
         name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
         reason = "; memory may have run out" if -status == signal.SIGKILL else ""
@@ -234,4 +236,5 @@ def _how_it_ended(status: int, errors_file: Path) -> str:
     else:
         how = f"ended without a result (exit status {status})"
     last = f" Its last words: {lines[-1][:300]}" if lines else ""
-    return f"The process that does the work {how}; nothing was changed. Try again, with a lower quality if need be.{last}"
+    advice = "nothing was changed. Try again, with a lower quality if need be."
+    return f"The process that does the work {how}; {advice}{last}"

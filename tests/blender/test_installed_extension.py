@@ -8,6 +8,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import subprocess
 import sys
 import venv
@@ -54,7 +55,11 @@ def blender(tmp_path_factory: pytest.TempPathFactory) -> Path:
         except metadata.PackageNotFoundError:
             continue  # required on other systems only
         for top in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
-            (site_packages / top).symlink_to(Path(str(distribution.locate_file(top))).resolve())
+            source = Path(str(distribution.locate_file(top))).resolve()
+            if name == "bpy" or source.is_file():
+                (site_packages / top).symlink_to(source)
+            else:  # the folder of numpy is handed to child processes: it must not lead back to one with scipy
+                shutil.copytree(source, site_packages / top)
         required = [text for text in distribution.requires or () if "extra ==" not in text]
         waiting += [match[0] for text in required if (match := re.match(r"[\w.-]+", text))]
     assert not linked & {"scipy", "pytetwild"}

@@ -76,7 +76,8 @@ def _interpolate(arguments: argparse.Namespace) -> None:
 
 def _bake(arguments: argparse.Namespace) -> None:
     try:
-        from .blender.bake import BakeRequest, bake_file
+        from .blender.bake import bake_file
+        from .blender.requests import BakeRequest
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     _require_distinct_files(arguments.file, arguments.report)

@@ -10,6 +10,7 @@ from itertools import pairwise
 import bpy
 
 from ..solver.errors import InputError
+from .records import PROPERTY
 
 
 def object_problem(obj: bpy.types.Object | None) -> str | None:
@@ -58,6 +59,11 @@ def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
         if name == following:
             return f"'{name}' comes twice in a row; choose different keys one after the other."
     return None
+
+
+def has_chains(keys: bpy.types.Key) -> bool:
+    """Whether something was baked on these shape keys. Quick enough for a button that is drawn all the time."""
+    return PROPERTY in keys and '"chains": []' not in keys[PROPERTY]
 
 
 def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:

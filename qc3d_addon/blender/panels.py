@@ -1,20 +1,18 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in the 3D view's sidebar."""
+"""The panel in the 3D view's sidebar: the choices, the button, and how far the work is."""
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
-from ..solver.errors import InputError
-from . import checks, shape_keys, slider
+from . import checks, jobs, presets
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from .operators.cancel import QC3D_OT_cancel
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
+from .panel_texts import draw_sentence
 from .properties import ObjectSettings, key_names
-from .records import Record
 
 
 class QC3D_PT_inbetweens(bpy.types.Panel):
@@ -34,22 +32,26 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         if problem is None:
             _draw_choices(layout, obj)
             problem = checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d))
+        job = jobs.current()
+        if job is not None:
+            _draw_job(layout, job)
+            return
         buttons = layout.column()
-        buttons.enabled = problem is None
         buttons.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
         buttons.operator(QC3D_OT_prepare.bl_idname)
         if problem is not None:
-            _draw_sentence(context, layout, problem)
-        if obj is not None and obj.type == 'MESH' and obj.data.shape_keys is not None:
-            _draw_sliders(context, layout, obj)
+            draw_sentence(context, layout, problem)
 
 
 def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     settings = obj.qc3d
+    presets.draw(layout)
     _draw_keys(layout, settings, obj.data.shape_keys)
-    layout.prop(settings, "count")
+    amount = layout.column(align=True)
+    amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
+    amount.prop(settings, "use_tolerance")
     layout.prop(settings, "mode")
-    layout.prop(settings, "quality")
+    layout.row().prop(settings, "quality", expand=True)
     layout.prop(settings, "use_keyframes")
     if settings.use_keyframes:
         frames = layout.column(align=True)
@@ -73,23 +75,9 @@ def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.t
     layout.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
 
 
-def _draw_sliders(context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    try:
-        chains = Record.read(obj.data.shape_keys).chains
-    except InputError as error:
-        _draw_sentence(context, layout, str(error))
-        return
-    sliders = layout.column()
-    sliders.use_property_split = False
-    for chain in chains:
-        owner = shape_keys.slider_owner(obj, chain)
-        if chain.slider in owner:
-            sliders.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
-
-
-def _draw_sentence(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str) -> None:
-    """Draw a sentence over as many lines as the width of the sidebar asks for; Blender would cut it."""
-    width = max(16, int(context.region.width / (7.0 * context.preferences.system.ui_scale)) - 4)
-    lines = layout.column(align=True)
-    for index, line in enumerate(textwrap.wrap(sentence, width)):
-        lines.label(text=line, icon='INFO' if index == 0 else 'BLANK1')
+def _draw_job(layout: bpy.types.UILayout, job: jobs.Job) -> None:
+    course = job.course
+    column = layout.column()
+    column.label(text=f"{job.label}, {job.seconds:.0f} s")
+    column.progress(text=course.stage, factor=course.fraction, type='BAR')
+    column.operator(QC3D_OT_cancel.bl_idname, icon='CANCEL')

@@ -8,11 +8,11 @@ from dataclasses import fields
 from typing import get_args, get_type_hints
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.settings import Settings
-from .bake import BakeRequest
 from .names import MAX_STEPS
+from .requests import BakeRequest
 
 _DESCRIPTIONS = {
     "mode": {
@@ -105,6 +105,24 @@ class BakeChoices(MapChoices):
         soft_max=20,
         options={'SKIP_SAVE'},
     )
+    use_tolerance: BoolProperty(
+        name="As Few as Needed",
+        description="Make as few in-betweens as stay within a tolerance, instead of a fixed number",
+        default=False,
+        options={'SKIP_SAVE'},
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How far a vertex may be from where it should be, at any position of the slider",
+        default=0.001,
+        min=1e-6,
+        soft_max=1.0,
+        precision=4,
+        step=0.01,
+        subtype='DISTANCE',
+        unit='LENGTH',
+        options={'SKIP_SAVE'},
+    )
     mode: _choice("mode", "How the map between the keys is interpolated")
     easing: _choice("easing", "How the speed from the first key to the last changes")
     use_keyframes: BoolProperty(
@@ -161,4 +179,5 @@ def bake_request(choices: BakeChoices) -> BakeRequest:
         count=choices.count,
         settings=solver_settings(choices),
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
+        tolerance=choices.tolerance if choices.use_tolerance else 0.0,
     )

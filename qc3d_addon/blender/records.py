@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import bpy
 
@@ -35,6 +36,10 @@ class Chain:
         Generated shape keys: their names by step, 0 (first key) to ``intervals`` (last key).
     keyframes
         First and last frame of the keyframes that a bake put on the slider, or None.
+    request
+        What the newest bake was asked for, as plain values; empty for those of older versions.
+    result
+        What the panel shows of the newest bake, as plain values.
     """
 
     through: tuple[str, ...]
@@ -42,6 +47,8 @@ class Chain:
     intervals: int = 0
     keys: dict[int, str] = field(default_factory=dict)
     keyframes: tuple[int, int] | None = None
+    request: dict[str, Any] = field(default_factory=dict)
+    result: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,12 @@ class Record:
         """The chain through these keys, if it was baked before."""
         return next((chain for chain in self.chains if chain.through == through), None)
 
+    def chain_of_slider(self, slider: str) -> Chain | None:
+        """The chain that a slider plays; the newest where the name is empty."""
+        if not slider:
+            return self.chains[-1] if self.chains else None
+        return next((chain for chain in self.chains if chain.slider == slider), None)
+
     def kept_map(self, keys: bpy.types.Key, wanted: KeptMap) -> bytes | None:
         """The bytes of the map that was made from exactly what ``wanted`` names, if it is kept."""
         data = keys.get(wanted.property_name) if wanted in self.maps else None
@@ -118,4 +131,5 @@ def _chain(entry: dict[str, object]) -> Chain:
     chain.through = tuple(str(name) for name in chain.through)
     chain.keys = {int(step): str(name) for step, name in dict(chain.keys).items()}
     chain.keyframes = None if chain.keyframes is None else (int(chain.keyframes[0]), int(chain.keyframes[1]))
+    chain.request, chain.result = dict(chain.request), dict(chain.result)
     return chain

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import cli, compat, panels, properties
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from . import cli, compat, jobs, panel_results, panels, preferences, presets, properties
+from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.cancel import QC3D_OT_cancel
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
 
@@ -15,10 +16,16 @@ CLASSES = (
     properties.InnerKey,  # before what has it
     properties.ObjectSettings,
     QC3D_OT_prepare,
+    preferences.QC3DPreferences,
     QC3D_OT_bake_inbetweens,
+    QC3D_OT_rebake,
+    QC3D_OT_cancel,
     QC3D_OT_add_inner_key,
     QC3D_OT_remove_inner_key,
+    presets.QC3D_MT_presets,
+    presets.QC3D_OT_add_preset,
     panels.QC3D_PT_inbetweens,
+    panel_results.QC3D_PT_results,  # after its parent
 )
 
 _commands: list[object] = []
@@ -29,6 +36,7 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
+    jobs.register()
     _commands.extend(compat.register_command("qc3d", cli.run_command))
 
 
@@ -36,6 +44,7 @@ def unregister() -> None:
     """Undo ``register`` in reverse order."""
     while _commands:
         compat.unregister_command(_commands.pop())
+    jobs.unregister()
     del bpy.types.Object.qc3d
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from .errors import naming_pair
 from .keypair import KeyPair
@@ -47,9 +47,9 @@ class Task:
     @classmethod
     def of_keys(
         cls,
-        shapes: dict[str, NDArray[np.floating]],
-        faces: NDArray[np.integer],
-        edges: NDArray[np.integer],
+        shapes: Mapping[str, ArrayLike],
+        faces: ArrayLike,
+        edges: ArrayLike,
         through: Sequence[str],
         settings: Settings,
         times: Floats | None = None,

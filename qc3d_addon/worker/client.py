@@ -166,8 +166,9 @@ class Worker:
             if kind == "MemoryError":
                 raise WorkerError(_OUT_OF_MEMORY)
             known = getattr(errors, str(kind), None)
-            is_ours = isinstance(known, type) and issubclass(known, QC3DError)
-            raise (known if is_ours else WorkerError)(str(sentence))
+            if isinstance(known, type) and issubclass(known, QC3DError):
+                raise known(str(sentence))
+            raise WorkerError(str(sentence))
         if ending is None or status != 0:
             raise WorkerError(_how_it_ended(status, self._errors))
         try:

@@ -51,8 +51,9 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
         (folder / f"made{number}.map").write_bytes(data)
     report = None
     if outcome.bake is not None:
-        arrays = {"times": outcome.bake.times, "frames": outcome.bake.frames}
-        np.savez(folder / "bake.npz", **arrays, **{f"measure {k}": v for k, v in outcome.bake.measures.items()})
+        arrays: dict[str, Any] = {"times": outcome.bake.times, "frames": outcome.bake.frames}
+        arrays |= {f"measure {name}": values for name, values in outcome.bake.measures.items()}
+        np.savez(folder / "bake.npz", **arrays)
         report = outcome.bake.report
     _write_json(folder / _OUTCOME, {"ends": list(outcome.maps), "report": report})
 

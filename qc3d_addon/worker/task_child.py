@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carry out one task in a process of its own, started by :mod:`qc3d_addon.worker.client`::
 
-    python -I task_child.py PACKAGE FOLDER MEMORY LIBRARIES...
+    python -I -S task_child.py PACKAGE FOLDER MEMORY LIBRARIES...
 
 PACKAGE is the folder of this package, whatever its name there; FOLDER holds the task and takes the outcome; MEMORY is
-the most that this process may allocate, in bytes, 0 for no limit; LIBRARIES are the folders to find numpy, scipy and
+the most that the work may allocate, in bytes, 0 for no limit; LIBRARIES are the folders to find numpy, scipy and
 pytetwild in. Messages go to standard output, each a JSON object that ends with a zero byte: ``{"progress": [stage,
 fraction]}`` while it works, and at the end ``{"done": true}`` or ``{"error": [kind, sentence]}``. When standard input
 closes, whoever started this is gone, and so is this.
@@ -84,11 +84,17 @@ def _end_with_parent() -> None:
 
 
 def _limit_memory(limit: int) -> None:
-    """Let allocations beyond the limit fail, where the system can do that."""
-    if limit > 0 and sys.platform == "linux":
-        import resource
+    """Let allocations of more than ``limit`` bytes beyond what is held now fail, where the system can do that."""
+    if limit <= 0 or sys.platform != "linux":
+        return
+    import resource
 
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+    import numpy as np
+
+    square = np.ones((64, 64))
+    square @ square  # OpenBLAS takes its buffers at the first product, and hangs where it cannot
+    held = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData:"))
+    resource.setrlimit(resource.RLIMIT_DATA, (int(held.split()[1]) * 1024 + limit,) * 2)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -16,8 +17,11 @@ import qc3d_addon  # noqa: E402
 from qc3d_addon.blender import records, slider  # noqa: E402
 from qc3d_addon.solver import pipeline  # noqa: E402
 from qc3d_addon.solver.meshing import FilledCube  # noqa: E402
+from qc3d_addon.solver.pipeline import Progress  # noqa: E402
 from qc3d_addon.solver.settings import Settings  # noqa: E402
+from qc3d_addon.solver.task import Outcome, Task, carry_out  # noqa: E402
 from qc3d_addon.solver.tetmesh import TetMesh  # noqa: E402
+from qc3d_addon.worker import client  # noqa: E402
 
 Shapes = dict[str, np.ndarray]
 
@@ -48,7 +52,21 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
         return FilledCube(TetMesh(corners, tets), "six", ())
 
     monkeypatch.setattr(pipeline, "fill_cube", fill_cube)
+    _work_here(monkeypatch)
     return calls
+
+
+@pytest.fixture
+def work_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in this process and not in a child process."""
+    _work_here(monkeypatch)
+
+
+def _work_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(task: Task, on_progress: Callable[[Progress], None] | None, limits: object) -> Outcome:
+        return pipeline.finish(carry_out(task), on_progress)
+
+    monkeypatch.setattr(client, "run", run)
 
 
 @pytest.fixture
@@ -132,10 +150,23 @@ def _describe_object(obj: bpy.types.Object) -> dict[str, Any]:
     }
 
 
+def _without_seconds(properties: dict[str, Any]) -> dict[str, Any]:
+    """The record without how long a bake took, which differs each time."""
+    if records.PROPERTY in properties:
+        try:
+            record = json.loads(properties[records.PROPERTY])
+            for chain in record["chains"]:
+                chain["result"].pop("seconds", None)
+        except (ValueError, KeyError, TypeError):
+            return properties  # not what a bake writes
+        properties[records.PROPERTY] = record
+    return properties
+
+
 def _describe_keys(keys: bpy.types.Key) -> dict[str, Any]:
     drivers = keys.animation_data.drivers if keys.animation_data else []
     return {
-        "properties": dict(keys.items()),
+        "properties": _without_seconds(dict(keys.items())),
         "relative": keys.use_relative,
         "blocks": [
             (key.name, key.value, key.mute, key.lock_shape, key.relative_key.name, coordinates(key).tobytes())

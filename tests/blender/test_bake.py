@@ -247,7 +247,8 @@ class TestSlider:
         assert all(driver.is_simple_expression and driver.is_valid for driver in drivers.values())
 
     def test_a_key_that_is_on_by_itself_is_pointed_out(self, figure: bpy.types.Object) -> None:
-        from qc3d_addon.blender.bake import BakeRequest, bake_object
+        from qc3d_addon.blender.bake import bake_object
+        from qc3d_addon.blender.requests import BakeRequest
 
         figure.data.shape_keys.key_blocks["Lean"].value = 0.5
         result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1))

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.bake import BakeRequest, bake_object
+from qc3d_addon.blender.bake import bake_object
+from qc3d_addon.blender.requests import BakeRequest
 from qc3d_addon.solver.easing import Easing, eased
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.settings import Settings
@@ -240,6 +241,9 @@ class TestPanel:
             def panel(self, name: str, default_closed: bool) -> tuple[Layout, Layout]:
                 assert default_closed
                 return self, self
+
+            def menu(self, name: str, **options: object) -> None:
+                assert hasattr(bpy.types, name)
 
             def label(self, text: str, **options: object) -> None:
                 drawn.append(text)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import shape_keys, slider
-from qc3d_addon.solver import pipeline
+from qc3d_addon.solver import pipeline, task
 from qc3d_addon.solver.errors import MeshingError
 
 State = Callable[[], dict[str, object]]
@@ -228,7 +228,7 @@ class TestLaterFailures:
             yield pipeline.Progress("fit", 0.5)
             raise MeshingError("No map without folds was found; try a finer quality.")
 
-        monkeypatch.setattr(pipeline, "prepare", prepare)
+        monkeypatch.setattr(task, "prepare", prepare)
         before = state()
         assert bake() == "Error: No map without folds was found; try a finer quality."
         assert refused(bpy.ops.qc3d.prepare) == "Error: No map without folds was found; try a finer quality."
@@ -251,7 +251,7 @@ class TestLaterFailures:
             made.frames[2, 4, 1] = value
             return made
 
-        monkeypatch.setattr(pipeline, "chain_inbetweens", spoiled)
+        monkeypatch.setattr(task, "chain_inbetweens", spoiled)
         before = state()
         assert said in bake()
         assert state() == before

@@ -65,7 +65,8 @@ def test_another_range_moves_the_keyframes_that_a_bake_made(figure: bpy.types.Ob
 
 
 def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
-    from qc3d_addon.blender.bake import BakeRequest, bake_object
+    from qc3d_addon.blender.bake import bake_object
+    from qc3d_addon.blender.requests import BakeRequest
 
     bake()
     figure[SLIDER] = 0.25

@@ -31,16 +31,16 @@ def reload(folder: Path) -> None:
 
 
 def test_a_real_map_survives_saving_and_loading(
-    figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work_here: None
 ) -> None:
-    from qc3d_addon.solver import pipeline
+    from qc3d_addon.solver import task
 
     real = {"quality": 'draft', "engine": 'delaunay'}
     assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}
     kept = map_properties()
     reload(tmp_path)
     assert map_properties() == kept
-    monkeypatch.setattr(pipeline, "prepare", None)  # a call would raise
+    monkeypatch.setattr(task, "prepare", None)  # a call would raise
     bake(**real)
     assert map_properties() == kept
 

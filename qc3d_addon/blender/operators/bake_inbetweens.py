@@ -1,41 +1,73 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that bakes in-betweens."""
+"""The operators that bake in-betweens, for the first time and again."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
+from bpy.props import StringProperty
 
-from ...solver.errors import QC3DError
-from .. import bake
+from ...solver.errors import InputError
+from .. import checks
+from ..plans import Plan, plan_bake, write_bake
 from ..properties import BakeChoices, bake_request, fill_from_panel
-from .common import poll_active_object, progress_shown
+from ..records import Record
+from ..requests import BakeRequest
+from .child_work import ChildWork
+from .common import poll_active_object, poll_panel_keys
+
+if TYPE_CHECKING:
+    from ...solver.task import Outcome
 
 
-class QC3D_OT_bake_inbetweens(BakeChoices, bpy.types.Operator):
+class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
     """Fill in the frames between two shape keys or more, as new shape keys that one slider plays"""
 
     bl_idname = "qc3d.bake_inbetweens"
     bl_label = "Bake In-Betweens"
-    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_active_object(cls, context)
+        return poll_active_object(cls, context) and poll_panel_keys(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def plan(self, context: bpy.types.Context) -> Plan:
         obj = context.active_object
         fill_from_panel(self.properties, obj.qc3d)
-        try:
-            request = bake_request(self)
-            with progress_shown(context, len(request.keys) - 1) as on_progress:
-                result = bake.bake_object(obj, request, on_progress)
-        except QC3DError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        for note in result.notes:
-            self.report({'WARNING'}, note)
-        self.report({'INFO'}, result.summary())
-        return {'FINISHED'}
+        return plan_bake(obj, bake_request(self))
+
+    def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        result = write_bake(plan, outcome)
+        return [*result.notes, result.summary()]
+
+
+class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
+    """Bake in-betweens again after their keys were sculpted, with the same choices; slider and drivers stay"""
+
+    bl_idname = "qc3d.rebake"
+    bl_label = "Re-Bake"
+
+    slider: StringProperty(
+        name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not poll_active_object(cls, context):
+            return False
+        if not checks.has_chains(context.active_object.data.shape_keys):
+            cls.poll_message_set(f"'{context.active_object.name}' has no in-betweens yet; bake some first.")
+            return False
+        return True
+
+    def plan(self, context: bpy.types.Context) -> Plan:
+        obj = checks.require_object(context.active_object)
+        chain = Record.read(obj.data.shape_keys).chain_of_slider(self.slider)
+        if chain is None:
+            raise InputError(f"'{obj.name}' has no in-betweens with the slider '{self.slider}'.")
+        return plan_bake(obj, BakeRequest.again(chain.through, chain.request))
+
+    def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        result = write_bake(plan, outcome)
+        return [*result.notes, result.summary()]

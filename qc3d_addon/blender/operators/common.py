@@ -1,51 +1,29 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the operators share."""
+"""What the operators share: when their buttons are disabled, and why."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
-
 import bpy
 
-from .. import checks
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...solver.pipeline import Progress
-
-STAGES_OF_A_MAP = 3  # mesh, locate, fit
-STAGES_OF_A_BAKE = ("factor", "frames")
+from .. import checks, jobs
+from ..properties import key_names
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether the active object can be baked; where not, the disabled button says why."""
-    problem = checks.object_problem(context.active_object)
+    """Whether the active object can be worked on now; where not, the disabled button says why."""
+    return _poll(operator, checks.object_problem(context.active_object) or jobs.busy_problem())
+
+
+def poll_panel_keys(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether the keys that the panel shows can be used; a script, which names its own, is never stopped."""
+    if context.region is None or context.region.type != 'UI':
+        return True
+    obj = context.active_object
+    return _poll(operator, checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d)))
+
+
+def _poll(operator: type[bpy.types.Operator], problem: str | None) -> bool:
     if problem is not None:
         operator.poll_message_set(problem)
     return problem is None
-
-
-@contextmanager
-def progress_shown(context: bpy.types.Context, maps: int) -> Iterator[Callable[[Progress], None]]:
-    """Show the progress at the mouse pointer while the block runs, which makes up to so many maps and then frames."""
-    manager = context.window_manager
-    begun: list[str] = []
-
-    def show(progress: Progress) -> None:
-        if progress.stage in STAGES_OF_A_BAKE:
-            done = STAGES_OF_A_MAP * maps + STAGES_OF_A_BAKE.index(progress.stage)
-        else:
-            if not begun or begun[-1] != progress.stage:
-                begun.append(progress.stage)
-            done = len(begun) - 1
-        manager.progress_update(done + progress.fraction)
-
-    manager.progress_begin(0.0, float(STAGES_OF_A_MAP * maps + len(STAGES_OF_A_BAKE)))
-    try:
-        yield show
-    finally:
-        manager.progress_end()

@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator behind the panel's Cancel."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import jobs
+
+
+class QC3D_OT_cancel(bpy.types.Operator):
+    """Stop the work that is running; nothing is changed"""
+
+    bl_idname = "qc3d.cancel"
+    bl_label = "Cancel"
+    bl_options = {'INTERNAL'}  # noqa: RUF012 - Blender reads it from the class
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if jobs.current() is None:
+            cls.poll_message_set("Nothing is being baked.")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        jobs.cancel()
+        return {'FINISHED'}

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators whose work runs in a child process, while the window goes on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import bpy
+
+from ...solver.errors import QC3DError
+from .. import jobs, preferences
+from ..plans import Plan
+
+if TYPE_CHECKING:
+    from ...solver.pipeline import Progress
+    from ...solver.task import Outcome
+
+_TICK = 0.05  # seconds between looks at the child process
+
+
+class ChildWork:
+    """Plan the work, let a child process do it, write its outcome; an operator says how by ``plan`` and ``write``.
+
+    From a button it is a modal operator that Esc ends; called by a script, or without a window, it runs to its end.
+    Nothing is written unless all of the work was done.
+    """
+
+    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
+
+    def plan(self, context: bpy.types.Context) -> Plan:
+        """What to compute; raises QC3DError where it cannot be done."""
+        raise NotImplementedError
+
+    def write(self, plan: Plan, outcome: Outcome) -> list[str]:
+        """Put what came of it into the file; sentences for the user, the last of them what was done."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ...worker import client
+
+        manager = context.window_manager
+        try:
+            problem = jobs.busy_problem()
+            if problem is not None:
+                raise_input(problem)
+            plan = self.plan(context)
+            course = jobs.Course(plan.task.new_maps, len(plan.task.times) > 0)
+
+            def show(progress: Progress) -> None:
+                course.follow(progress)
+                manager.progress_update(course.fraction)
+
+            manager.progress_begin(0.0, 1.0)
+            try:
+                outcome = client.run(plan.task, show, preferences.limits(context))
+            finally:
+                manager.progress_end()
+            return self._finish(plan, outcome)
+        except QC3DError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        try:
+            self._plan = self.plan(context)
+            self._job = jobs.begin(self.bl_label, self._plan.task, preferences.limits(context))
+        except QC3DError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        _redraw(context)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == 'ESC' and event.value == 'PRESS':
+            jobs.cancel()
+        if self._job.is_cancelled:
+            self._leave(context)
+            self.report({'INFO'}, f"{self.bl_label} was cancelled; nothing was changed.")
+            return {'CANCELLED'}
+        if event.type != 'TIMER':
+            return {'PASS_THROUGH'}
+        try:
+            outcome = self._job.poll()
+            if outcome is None:
+                _show_status(context, self._job)
+                return {'PASS_THROUGH'}
+            self._leave(context)
+            return self._finish(self._plan, outcome)
+        except QC3DError as error:
+            self._leave(context)
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
+        jobs.cancel()
+
+    def _finish(self, plan: Plan, outcome: Outcome) -> set[str]:
+        *notes, summary = self.write(plan, outcome)
+        for note in notes:
+            self.report({'WARNING'}, note)
+        self.report({'INFO'}, summary)
+        return {'FINISHED'}
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        context.window_manager.event_timer_remove(self._timer)
+        jobs.end()
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+        _redraw(context)
+
+
+def raise_input(problem: str) -> None:
+    """Raise InputError with this sentence."""
+    from ...solver.errors import InputError
+
+    raise InputError(problem)
+
+
+def _show_status(context: bpy.types.Context, job: jobs.Job) -> None:
+    if context.workspace is not None:
+        course = job.course
+        context.workspace.status_text_set(f"{job.label}: {course.stage}, {course.fraction:.0%}   (Esc: cancel)")
+    _redraw(context)
+
+
+def _redraw(context: bpy.types.Context) -> None:
+    """Let the sidebars of all 3D views be drawn again."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                for region in area.regions:
+                    if region.type == 'UI':
+                        region.tag_redraw()

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sub-panel below the choices: each slider with what its bake made."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..solver.errors import InputError
+from . import checks, shape_keys, slider
+from .operators.bake_inbetweens import QC3D_OT_rebake
+from .panel_texts import draw_sentence
+from .panels import QC3D_PT_inbetweens
+from .records import Chain, Record
+
+
+class QC3D_PT_results(bpy.types.Panel):
+    """The sliders of the active object's in-betweens, the newest first."""
+
+    bl_label = "In-Betweens"
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "QC3D"
+    bl_parent_id = QC3D_PT_inbetweens.__name__
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        obj = context.active_object
+        is_mesh = obj is not None and obj.type == 'MESH'
+        return is_mesh and obj.data.shape_keys is not None and checks.has_chains(obj.data.shape_keys)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        obj = context.active_object
+        try:
+            chains = Record.read(obj.data.shape_keys).chains
+        except InputError as error:
+            draw_sentence(context, self.layout, str(error), 'ERROR')
+            return
+        for chain in reversed(chains):
+            _draw_chain(context, self.layout.box(), obj, chain)
+
+
+def _draw_chain(
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
+) -> None:
+    owner = shape_keys.slider_owner(obj, chain)
+    if chain.slider in owner:
+        layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
+    else:
+        layout.label(text=f"{chain.slider}: the slider was deleted", icon='ERROR')
+    result = chain.result
+    if result:
+        facts = layout.column(align=True)
+        facts.scale_y = 0.8
+        facts.label(text=f"{result['count']} in-betweens in {result['seconds']:.1f} s, engine {result['engine']}")
+        clean = not result["folds"] and not result["crossings"]
+        facts.label(
+            text=f"Folds {result['folds']}, new crossings {result['crossings']}",
+            icon='CHECKMARK' if clean else 'ERROR',
+        )
+        worst = result.get("worst")
+        if worst:
+            facts.label(text=f"Worst stretch {worst['stretch']:.2f} at step {worst['step']}")
+        facts.label(text=f"Residual {result['residual']:.1e} of the size")
+        for note in result["notes"]:
+            draw_sentence(context, layout, note)
+    buttons = layout.row(align=True)
+    buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider

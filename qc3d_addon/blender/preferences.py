@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's preferences: what a bake may use of the machine."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import IntProperty
+
+if TYPE_CHECKING:
+    from ..worker.client import Limits
+
+_PACKAGE = __package__.rpartition(".")[0]  # what Blender knows the add-on by
+_MINUTES = 60
+_SHARE_OF_MEMORY = 0.75
+
+
+class QC3DPreferences(bpy.types.AddonPreferences):
+    """Limits of the process that does the work."""
+
+    bl_idname = _PACKAGE
+
+    time_limit: IntProperty(
+        name="Time Limit",
+        description="Minutes after which a bake is stopped",
+        default=_MINUTES,
+        min=1,
+        max=10_000,
+    )
+    memory_limit: IntProperty(
+        name="Memory Limit",
+        description="Megabytes that a bake may allocate, on Linux; 0 for three quarters of the machine's memory",
+        default=0,
+        min=0,
+        max=10_000_000,
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "time_limit", text="Time Limit (Minutes)")
+        row = layout.row()
+        row.active = sys.platform == "linux"
+        row.prop(self, "memory_limit", text="Memory Limit (MB)")
+
+
+def limits(context: bpy.types.Context) -> "Limits":
+    """What the child process may use."""
+    from ..worker.client import Limits
+
+    addon = context.preferences.addons.get(_PACKAGE)
+    chosen = None if addon is None else addon.preferences
+    minutes = _MINUTES if chosen is None else chosen.time_limit
+    memory = 0 if chosen is None else chosen.memory_limit
+    return Limits(60.0 * minutes, memory or _automatic_memory())
+
+
+def _automatic_memory() -> int:
+    try:
+        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not known on this system
+        return 0
+    return int(_SHARE_OF_MEMORY * total / 2**20)

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""As few frames as show the others closely enough."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .tetmesh import Floats
+
+
+def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
+    """The fewest even steps between every two keys whose straight blends show all the frames.
+
+    Parameters
+    ----------
+    frames : (pairs · d + 1, n, 3)
+        Evenly spaced frames from the first key of all to the last, d steps for every two keys.
+    tolerance
+        How far a vertex may be from where its frame has it, in the unit of the frames.
+    pairs
+        Number of pairs of keys that the frames go through.
+
+    Returns
+    -------
+    int
+        A divisor of d; d itself where no smaller one is enough.
+    """
+    dense = (len(frames) - 1) // pairs
+    for steps in (steps for steps in range(1, dense) if dense % steps == 0):
+        if _largest_distance(frames, dense // steps) <= tolerance:
+            return steps
+    return dense
+
+
+def _largest_distance(frames: Floats, stride: int) -> float:
+    """How far the straight blends of every ``stride``-th frame are from the frames between them."""
+    kept = frames[::stride]
+    largest = 0.0
+    for offset in range(1, stride):
+        part = offset / stride
+        blend = (1.0 - part) * kept[:-1] + part * kept[1:]
+        largest = max(largest, float(np.linalg.norm(frames[offset::stride] - blend, axis=2).max()))
+    return largest

@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NoReturn, get_args
 
+from .commands import reconstruct
 from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing, write_frames
 from .solver.easing import Easing
@@ -135,6 +136,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_settings(bake)
     bake.set_defaults(run=_bake)
+
+    for command in (reconstruct,):
+        command.add_to(commands)
     return parser
 
 

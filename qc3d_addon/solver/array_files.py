@@ -45,24 +45,16 @@ def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
             raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
         if first == second:
             raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
-    try:
-        archive = np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {_reason(error)}.") from error
-    except _UNREADABLE:
-        archive = None
-    if not isinstance(archive, NpzFile):
-        raise InputError(f"{path} is not an .npz file of arrays; faces, shape_names and V0, V1, ... are needed.")
-    with archive:
-        shape_names = _array(archive, "shape_names", path)
+    with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
+        shape_names = read_array(archive, "shape_names", path)
         if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
             raise InputError(f"shape_names in {path} must be a list of texts.")
         known = shape_names.tolist()
         for name in names:
             if name not in known:
                 raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
-        keys = {name: _array(archive, f"V{known.index(name)}", path) for name in names}
-        faces = _array(archive, "faces", path)
+        keys = {name: read_array(archive, f"V{known.index(name)}", path) for name in names}
+        faces = read_array(archive, "faces", path)
     for name, key in keys.items():
         if key.dtype.kind not in "fiu":
             raise InputError(f"The shape {name!r} in {path} holds {key.dtype} values; coordinates must be numbers.")
@@ -85,6 +77,44 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
         np.savez_compressed(
             file, faces=pairs[0].faces, frames=frames, times=times, key0=pairs[0].key0, key1=pairs[-1].key1
         )
+
+
+@contextmanager
+def open_archive(path: Path, needed: str) -> Iterator[NpzFile]:
+    """Open an .npz file of arrays, without pickled objects; ``needed`` says what it should hold.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is something else.
+    """
+    try:
+        archive = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {_reason(error)}.") from error
+    except _UNREADABLE:
+        archive = None
+    if not isinstance(archive, NpzFile):
+        raise InputError(f"{path} is not an .npz file of arrays; {needed}.")
+    with archive:
+        yield archive
+
+
+def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
+    """An array of an open archive; ``path`` is named where it is not there.
+
+    Raises
+    ------
+    InputError
+        If there is no such array, or it cannot be read.
+    """
+    try:
+        array: NDArray[np.generic] = archive[name]
+    except KeyError:
+        raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None
+    except _UNREADABLE as error:
+        raise InputError(f"The array {name} in {path} cannot be read: {_reason(error)}.") from error
+    return array
 
 
 @contextmanager
@@ -114,16 +144,6 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with suppress(FileNotFoundError):
             new.unlink()
-
-
-def _array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
-    try:
-        array: NDArray[np.generic] = archive[name]
-    except KeyError:
-        raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None
-    except _UNREADABLE as error:
-        raise InputError(f"The array {name} in {path} cannot be read: {_reason(error)}.") from error
-    return array
 
 
 def _reason(error: BaseException) -> str:

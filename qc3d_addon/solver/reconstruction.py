@@ -3,8 +3,9 @@
 """A map rebuilt from its representation: the 3D linear Beltrami solver (Chen & Lui, section 3.3).
 
 With A = det(P) P^-2 each coordinate of the map solves div(A grad u) = 0. The three systems share one stiffness matrix
-and differ only in which vertices are held: u on the faces x = 0 and x = 1 of the cube, v on y, w on z (the other
-faces slide), and the landmarks. On a piecewise linear map the rebuilding is exact up to rounding.
+and differ only in which vertices are held: on the sliding cube u on the faces x = 0 and x = 1, v on y, w on z, and any
+landmarks. The rebuilding of a piecewise linear map is exact up to rounding on the sliding cube, and on any mesh
+whose whole boundary is held.
 """
 
 from __future__ import annotations
@@ -13,13 +14,45 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import cg
 
+from .conditions import Conditions
 from .errors import ReconstructionError
+from .mapping import Mapping
 from .representation import conductivity
 from .stiffness import StiffnessPattern, stiffness_elements
-from .tetmesh import Bools, Floats, Ints, TetMesh
+from .tetmesh import Bools, Floats, TetMesh
 
 _TOLERANCE = 1e-14
 _MOST_ITERATIONS = 20_000
+
+
+def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mapping:
+    """The map of any tetrahedral mesh that has a representation and meets conditions of the caller's choice.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    stretch : (M, 3, 3)
+        Symmetric positive definite matrices, one for each tetrahedron.
+    conditions : Conditions
+        Where the map is given.
+
+    Raises
+    ------
+    ReconstructionError
+        If the sizes do not fit, a stretch is not symmetric and positive definite, a part of the mesh is held too
+        little, or the iteration does not converge.
+    """
+    if stretch.shape != (len(mesh.tets), 3, 3):
+        raise ReconstructionError(
+            f"The representation has the shape {stretch.shape}; the mesh's {len(mesh.tets)} tetrahedra need "
+            f"{(len(mesh.tets), 3, 3)}."
+        )
+    if not np.array_equal(stretch, stretch.transpose(0, 2, 1)):
+        raise ReconstructionError("The representation holds matrices that are not symmetric, or not finite.")
+    if conditions.held.shape != mesh.points.shape:
+        raise ReconstructionError("The conditions were made for another mesh.")
+    conditions.require_enough(mesh)
+    return Mapping(mesh, Reconstructor(mesh, conditions.held).rebuild(stretch, conditions.values))
 
 
 class Reconstructor:
@@ -28,9 +61,9 @@ class Reconstructor:
     Parameters
     ----------
     mesh : TetMesh
-        Mesh of the unit cube.
-    landmarks : (k,) int64, optional
-        Vertices whose three coordinates are given, besides the sliding boundary.
+        Any tetrahedral mesh; the unit cube where ``held`` is not given.
+    held : (N, 3) bool, optional
+        Which coordinates of which vertices are given; those of the sliding cube where it is not given.
 
     Raises
     ------
@@ -38,14 +71,14 @@ class Reconstructor:
         If a coordinate would be held nowhere.
     """
 
-    def __init__(self, mesh: TetMesh, landmarks: Ints | None = None) -> None:
+    def __init__(self, mesh: TetMesh, held: Bools | None = None) -> None:
         self._mesh = mesh
         self._pattern = StiffnessPattern(mesh.tets, len(mesh.points))
-        self._held = mesh.on_cube_face.copy()
-        if landmarks is not None:
-            self._held[landmarks] = True
+        self._held = mesh.on_cube_face if held is None else held
         if not self._held.any(axis=0).all():
             raise ReconstructionError("A coordinate of the map is held nowhere; give boundary values or landmarks.")
+        self._unused = np.ones(len(mesh.points), dtype=bool)
+        self._unused[mesh.tets] = False
 
     def rebuild(self, stretch: Floats, values: Floats, start: Floats | None = None) -> Floats:
         """The map whose representation is ``stretch``.
@@ -55,9 +88,10 @@ class Reconstructor:
         stretch : (M, 3, 3)
             Symmetric positive definite matrices.
         values : (N, 3)
-            Read only where a coordinate is held: on its two cube faces and at the landmarks.
+            Read only where a coordinate is held.
         start : (N, 3), optional
-            A guess that shortens the iteration; the identity where it is not given.
+            A guess that shortens the iteration; the identity where it is not given. Vertices of no tetrahedron
+            stay there.
 
         Returns
         -------
@@ -74,13 +108,13 @@ class Reconstructor:
         for coordinate in range(3):
             held = self._held[:, coordinate]
             result[held, coordinate] = values[held, coordinate]
-            result[~held, coordinate] = _solve_held(matrix, held, result[:, coordinate])
+            free = ~(held | self._unused)
+            result[free, coordinate] = _solve(matrix, free, result[:, coordinate])
         return result
 
 
-def _solve_held(matrix: csr_array, held: Bools, column: Floats) -> Floats:
-    """Solve the free rows for their values, the held ones given; Jacobi-preconditioned conjugate gradients."""
-    free = ~held
+def _solve(matrix: csr_array, free: Bools, column: Floats) -> Floats:
+    """Solve the free rows for their values, the others given; Jacobi-preconditioned conjugate gradients."""
     inner = matrix[free][:, free]
     # Solving for the correction of the guess keeps the relative tolerance meaningful for good guesses.
     residual = -(matrix @ column)[free]

@@ -78,7 +78,8 @@ def from_eigen_form(numbers: Floats) -> Floats:
     vectors[:, 0] = np.column_stack([ca * cb, ca * sb * sg - sa * cg, ca * sb * cg + sa * sg])
     vectors[:, 1] = np.column_stack([sa * cb, sa * sb * sg + ca * cg, sa * sb * cg - ca * sg])
     vectors[:, 2] = np.column_stack([-sb, cb * sg, cb * cg])
-    return np.asarray((vectors * numbers[:, None, :3]) @ vectors.transpose(0, 2, 1))
+    product = (vectors * numbers[:, None, :3]) @ vectors.transpose(0, 2, 1)
+    return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))  # symmetric to the last bit
 
 
 def conductivity(stretch: Floats) -> Floats:

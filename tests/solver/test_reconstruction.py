@@ -22,7 +22,7 @@ from qc3d_addon.solver.representation import (
     upper_triangle,
 )
 from qc3d_addon.solver.rotations import rotation_matrices
-from qc3d_addon.solver.tetmesh import Floats, Ints, TetMesh
+from qc3d_addon.solver.tetmesh import Bools, Floats, Ints, TetMesh
 
 from .meshes import jittered_grid, kuhn_grid, sine_map
 
@@ -48,6 +48,13 @@ def without_folds(mesh: TetMesh, bijection: Bijection) -> Floats:
 
 def boundary_vertices(mesh: TetMesh) -> Ints:
     return np.flatnonzero(mesh.on_cube_face.any(axis=1))
+
+
+def held_with(mesh: TetMesh, landmarks: Ints) -> Bools:
+    """The sliding boundary and all of some vertices."""
+    held = mesh.on_cube_face.copy()
+    held[landmarks] = True
+    return held
 
 
 def along_axes(points: Floats) -> Floats:
@@ -111,14 +118,14 @@ def test_an_affine_map_comes_back_from_its_boundary(mesh: TetMesh) -> None:
     values = mesh.points @ shear.T + np.array([0.3, -0.2, 0.1])
     landmarks = boundary_vertices(mesh)
     given_values = np.where(np.isin(np.arange(len(values)), landmarks)[:, None], values, 0.0)
-    rebuilt = Reconstructor(mesh, landmarks).rebuild(stretch_of(mesh, values), given_values)
+    rebuilt = Reconstructor(mesh, held_with(mesh, landmarks)).rebuild(stretch_of(mesh, values), given_values)
     assert np.abs(rebuilt - values).max() < EXACT
 
 
 def test_true_landmarks_change_nothing(mesh: TetMesh) -> None:
     values = without_folds(mesh, all_at_once)
     landmarks = np.random.default_rng(4).choice(len(values), 20, replace=False)
-    rebuilt = Reconstructor(mesh, landmarks).rebuild(stretch_of(mesh, values), values)
+    rebuilt = Reconstructor(mesh, held_with(mesh, landmarks)).rebuild(stretch_of(mesh, values), values)
     np.testing.assert_array_equal(rebuilt[landmarks], values[landmarks])
     assert np.abs(rebuilt - values).max() < EXACT
 
@@ -128,15 +135,13 @@ def test_other_landmarks_are_held_and_the_rest_is_in_balance() -> None:
     landmarks = np.flatnonzero(~mesh.on_cube_face.any(axis=1))[[3, 50, 90]]
     wanted = mesh.points + np.isin(np.arange(len(mesh.points)), landmarks)[:, None] * np.array([0.05, -0.03, 0.02])
     identity = np.tile(np.eye(3), (len(mesh.tets), 1, 1))
-    rebuilt = Reconstructor(mesh, landmarks).rebuild(identity, wanted)
+    rebuilt = Reconstructor(mesh, held_with(mesh, landmarks)).rebuild(identity, wanted)
     np.testing.assert_array_equal(rebuilt[landmarks], wanted[landmarks])
     # With A = I the energy is Dirichlet's, whose gradient vanishes wherever nothing is held.
     forces = mesh.volumes[:, None, None] * (mesh.gradients @ mesh.jacobians(rebuilt).transpose(0, 2, 1))
     total = np.zeros_like(rebuilt)
     np.add.at(total, mesh.tets, forces)
-    held = mesh.on_cube_face.copy()
-    held[landmarks] = True
-    assert np.abs(total[~held]).max() < 1e-13
+    assert np.abs(total[~held_with(mesh, landmarks)]).max() < 1e-13
     assert np.abs(total[landmarks]).max() > 1e-3
 
 
@@ -215,7 +220,7 @@ class TestErrors:
         inside = TetMesh(0.25 + 0.5 * cube.points, cube.tets)
         with pytest.raises(ReconstructionError, match="held nowhere"):
             Reconstructor(inside)
-        Reconstructor(inside, landmarks=np.array([0]))
+        Reconstructor(inside, held_with(inside, np.array([0])))
 
     def test_an_iteration_that_does_not_end(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(reconstruction, "_MOST_ITERATIONS", 2)

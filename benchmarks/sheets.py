@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from .catalogue import ROOT, Pair
+from qc3d_addon.figures.sheets import Row, save_sheet
+
+from .catalogue import Pair
 from .report import ORDER
 from .results import Results
 
@@ -29,9 +30,6 @@ TITLES = {"straight": "straight", "linear": "linear", "poisson": "Poisson", "ara
 
 def save(results: Results, folder: Path) -> list[Path]:
     """Draw the sheets of every family whose frames are there; returns the files written."""
-    sys.path.insert(0, str(ROOT / "tools"))
-    from contact_sheet import Row, save_sheet  # type: ignore[import-not-found,unused-ignore]
-
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for pair in SHOWN:

@@ -12,7 +12,7 @@ from matplotlib import image
 
 import contact_sheet
 from qc3d_addon import cli
-from shading import Camera, best_view, draw
+from qc3d_addon.figures.shading import Camera, best_view, draw
 
 RED, WHITE = (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
@@ -27,6 +27,15 @@ def test_a_square_covers_its_pixels_without_gaps() -> None:
     assert picture.shape == (40, 40, 3)
     assert is_red[10:30, 10:30].all()
     assert is_red.sum() == 400
+
+
+def test_triangles_of_their_own_colours() -> None:
+    camera = Camera.around(SQUARE, "front", margin=0.0)
+    colours = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    picture = draw(SQUARE, HALVES, camera, 40, colours, WHITE, samples=1)
+    # The diagonal runs from the lower left to the upper right; the first half is below it.
+    assert picture[30, 20, 2] == 0.0 < picture[30, 20, 0]
+    assert picture[10, 20, 0] == 0.0 < picture[10, 20, 2]
 
 
 def test_the_nearer_shape_hides_the_other_whatever_their_order() -> None:

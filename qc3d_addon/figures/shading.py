@@ -57,7 +57,7 @@ def draw(
     faces: Ints,
     camera: Camera,
     height: int,
-    colour: tuple[float, float, float],
+    colour: tuple[float, float, float] | Floats,
     background: tuple[float, float, float],
     samples: int = 3,
 ) -> Floats:
@@ -71,7 +71,9 @@ def draw(
         Triangles; their back sides are drawn darker.
     height : int
         Rows of the picture; the columns follow from the camera.
-    colour, background
+    colour
+        Red, green, blue in 0..1, of the shape or of each triangle (m, 3).
+    background
         Red, green, blue in 0..1.
     samples
         Each pixel is the mean of ``samples`` x ``samples`` points.
@@ -102,7 +104,8 @@ def draw(
     front = normal[:, 2] >= 0.0
     light = _brightness(np.where(front[:, None], normal, -normal)) * np.where(front, 1.0, 0.6)
     picture = np.broadcast_to(np.array(background), (fine * width, 3)).copy()
-    picture[drawn] = np.clip(light[:, None] * np.array(colour), 0.0, 1.0)
+    paint = np.array(colour)
+    picture[drawn] = np.clip(light[:, None] * (paint if paint.ndim == 1 else paint[triangle[chosen]]), 0.0, 1.0)
     picture = picture.reshape(fine // samples, samples, width // samples, samples, 3).mean(axis=(1, 3))
     return np.asarray(picture[::-1])
 

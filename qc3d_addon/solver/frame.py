@@ -22,6 +22,8 @@ class Frame:
     ----------
     positions : (n, 3)
         In the keys' coordinates.
+    values : (N, 3)
+        The frame's map, cube units.
     smallest_determinant : float
         The smallest Jacobian determinant of the frame's map of the cube; positive means no folds.
     place : (3,)
@@ -35,6 +37,7 @@ class Frame:
     """
 
     positions: Floats
+    values: Floats
     smallest_determinant: float
     place: Floats
     folds: int
@@ -51,7 +54,7 @@ class Frame:
         embedding = prepared.embedding
         place = embedding.from_cube(values[prepared.mesh.tets[worst]].mean(axis=0)[None], time)[0]
         folds = int((determinant <= 0.0).sum())
-        return cls(positions, float(determinant[worst]), place, folds, repaired, crossings)
+        return cls(positions, values, float(determinant[worst]), place, folds, repaired, crossings)
 
     def certificate(self, time: float) -> dict[str, Any]:
         """Plain values for the report."""

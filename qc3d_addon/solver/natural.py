@@ -20,7 +20,6 @@ from .surface_path import SurfacePath
 from .tetmesh import Bools, Floats, Ints
 from .uncrossing import CrossingLimit
 from .volume_path import VolumePath
-from .winding import winding_numbers
 
 _UNCROSSING_ATTEMPTS = 3
 # How many times as strongly the surface is drawn to the volume's anchors at a crossing.
@@ -41,13 +40,12 @@ class NaturalFrames:
         self._prepared = prepared
         self.notes: tuple[str, ...] = ()
         embedding, mesh = prepared.embedding, prepared.mesh
-        inside = winding_numbers(embedding.key0, prepared.pair.faces, mesh.centroids)
         self._surface = SurfacePath(embedding, law, prepared.extra_turns != 0)
         self._spins = ExtraSpins(embedding, self._surface, prepared.extra_turns)
         if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         turning = _turning_inside(prepared, self._surface)
-        self._volume = VolumePath(mesh, prepared.mapped, turning, inside, law)
+        self._volume = VolumePath(mesh, prepared.mapped, turning, prepared.insideness, law)
         self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1)
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [

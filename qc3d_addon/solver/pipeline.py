@@ -24,10 +24,11 @@ from .frame import Frame
 from .keypair import KeyPair
 from .linear import LinearFrames
 from .location import interpolation_matrix
-from .memory import peak_memory_mb
+from .measures import measure
 from .meshing import fill_cube
 from .natural import NaturalFrames
 from .prepared import PreparedMap
+from .report import bake_report
 from .settings import Settings
 from .surface_path import SurfacePath
 from .tetmesh import Floats, Ints
@@ -211,35 +212,13 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
             error = _replace_by_keys(frames, members, local, prepared[number].pair)
             key_error = max(key_error, error / prepared[number].pair.diagonal)
     yield Progress("frames", 1.0)
+    ordered = [made[index] for index in range(len(wanted))]
+    with _timed(seconds, "measure"):
+        measures, worst = measure(prepared, segments, frames, [frame.values for frame in ordered])
     notes = [note for part in prepared for note in part.notes] + [note for maker in makers for note in maker.notes]
-    crossings = [made[index].crossings for index in range(len(wanted))]
-    if any(crossings):
-        worst = int(np.argmax(crossings))
-        notes.append(
-            f"The frame at {wanted[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than a key."
-        )
-    residuals = [part.landmark_residual() for part in prepared]
-    report = {
-        "engine": ", ".join(dict.fromkeys(part.engine for part in prepared)),
-        "mode": settings.mode,
-        "stretch": settings.stretch,
-        "easing": settings.easing,
-        "quality": prepared[0].quality,
-        "vertices": len(prepared[0].pair.key0),
-        "tetrahedra": sum(len(part.mesh.tets) for part in prepared),
-        "folds": {
-            "map": sum(part.folds(part.mapped) for part in prepared),
-            "frames": [made[index].folds for index in range(len(wanted))],
-        },
-        "crossings": crossings,
-        "certificates": [made[index].certificate(time) for index, time in enumerate(wanted.tolist())],
-        "residual": {name: max(residual[name] for residual in residuals) for name in ("rms", "max")},
-        "key_error": key_error,
-        "seconds": seconds,
-        "peak_memory_mb": peak_memory_mb(),
-        "notes": list(dict.fromkeys(notes)),
-    }
-    return Bake(wanted, frames, report)
+    report = bake_report(prepared, settings, wanted, ordered, notes)
+    report |= {"worst_stretch": worst, "key_error": key_error, "seconds": seconds}
+    return Bake(wanted, frames, report, measures)
 
 
 class _FrameMaker(Protocol):

@@ -16,6 +16,7 @@ from .keypair import KeyPair
 from .location import interpolation_matrix
 from .rotations import determinants
 from .tetmesh import Floats, TetMesh
+from .winding import insideness, winding_numbers
 
 _REPAIR_ITERATIONS = 15
 
@@ -70,6 +71,11 @@ class PreparedMap:
     def landmarks(self) -> csr_array:
         """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
         return interpolation_matrix(self.mesh, self.embedding.key0)
+
+    @cached_property
+    def insideness(self) -> Floats:
+        """(M,) how far inside the object the tetrahedra are."""
+        return insideness(winding_numbers(self.embedding.key0, self.pair.faces, self.mesh.centroids))
 
     @cached_property
     def fitter(self) -> FoldFreeFitter:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
@@ -13,8 +12,6 @@ from .representation import polar_decomposition
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
 from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, TetMesh
-
-OUTSIDE_WEIGHT = 1e-3
 
 
 class VolumePath:
@@ -30,17 +27,17 @@ class VolumePath:
         The fitted map, without folds.
     turning : Turning
         How the tetrahedra turn.
-    inside : (M,)
-        Winding numbers, 1 inside the object and 0 outside; what is between is weighted in between.
+    insideness : (M,)
+        What the tetrahedra count besides their volume: most inside the object.
     law : StretchLaw
     """
 
-    def __init__(self, mesh: TetMesh, mapped: Floats, turning: Turning, inside: Floats, law: StretchLaw) -> None:
+    def __init__(self, mesh: TetMesh, mapped: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
         self._mesh = mesh
         self._turning = turning
         self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(mapped)).stretch)
         self._law = law
-        weights = mesh.volumes * np.clip(np.abs(inside), OUTSIDE_WEIGHT, 1.0)
+        weights = mesh.volumes * insideness
         self._weighted_gradients = weights[:, None, None] * mesh.gradients
         matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(stiffness_elements(weights, mesh.gradients))
         self._held = mesh.on_cube_face

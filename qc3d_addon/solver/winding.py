@@ -9,6 +9,8 @@ import numpy as np
 from .surface import face_normals
 from .tetmesh import Floats, Ints
 
+OUTSIDE_WEIGHT = 1e-3
+
 _MOST_DIPOLES = 8_000
 # Queries at once: few enough that their distances to all dipoles stay in the processor's cache.
 _CHUNK = 64
@@ -45,6 +47,14 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
         sums = inverse @ moments
         numbers[begin : begin + _CHUNK] = sums[:, 3] - np.einsum("ij,ij->i", query, sums[:, :3])
     return numbers / (4.0 * np.pi)
+
+
+def insideness(numbers: Floats) -> Floats:
+    """(k,) what volume counts by its winding numbers: 1 inside, ``OUTSIDE_WEIGHT`` outside, in between near holes.
+
+    Surfaces that are reversed (-1) or nested (2) have an inside all the same.
+    """
+    return np.asarray(np.clip(np.abs(numbers), OUTSIDE_WEIGHT, 1.0))
 
 
 def _dipoles(points: Floats, faces: Ints) -> tuple[Floats, Floats]:

@@ -152,7 +152,7 @@ class TestReport:
         assert report["folds"]["map"] == 0
         assert len(report["folds"]["frames"]) == len(TIMES)
         assert report["residual"] == prepared.landmark_residual()
-        assert set(report["seconds"]) == {"mesh", "locate", "fit", "factor", "frames"}
+        assert set(report["seconds"]) == {"mesh", "locate", "fit", "factor", "frames", "measure"}
         assert report["peak_memory_mb"] is None or 10.0 < report["peak_memory_mb"] < 1e6
         assert report["notes"] == []
 

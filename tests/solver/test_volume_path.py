@@ -13,13 +13,14 @@ from qc3d_addon.solver.rotations import rotation_matrices, rotation_vectors
 from qc3d_addon.solver.stretch import StretchLaw
 from qc3d_addon.solver.tetmesh import Floats, TetMesh
 from qc3d_addon.solver.volume_path import VolumePath
+from qc3d_addon.solver.winding import insideness
 
 from .meshes import jittered_grid, kuhn_grid
 
 
 def path_of(mesh: TetMesh, values: Floats, inside: Floats, law: StretchLaw = "linear") -> VolumePath:
     turns = rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation)
-    return VolumePath(mesh, values, Turning(turns, np.zeros_like(turns)), inside, law)
+    return VolumePath(mesh, values, Turning(turns, np.zeros_like(turns)), insideness(inside), law)
 
 
 def whirled(points: Floats, angle: float) -> Floats:
@@ -87,7 +88,7 @@ def test_a_twist_by_whole_turns_ends_where_none_does(turns: int) -> None:
     axis = np.array([0.0, 0.6, 0.8])
     twist = np.where(core[:, None], (0.7 + 2.0 * np.pi * turns) * axis, 0.0)
     swing = rotation_vectors(rotations @ rotation_matrices(-twist))
-    path = VolumePath(mesh, values, Turning(swing, twist), core.astype(np.float64), "linear")
+    path = VolumePath(mesh, values, Turning(swing, twist), insideness(core.astype(np.float64)), "linear")
     np.testing.assert_allclose(path.at(0.0), mesh.points, rtol=0.0, atol=1e-11)
     np.testing.assert_allclose(path.at(1.0), values, rtol=0.0, atol=1e-11)
     middle = np.linalg.norm(mesh.points - 0.5, axis=1) < 0.1

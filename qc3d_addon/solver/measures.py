@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Distortion of every frame at every vertex, against the first key of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+
+from .distortion import TriangleStretches, dilatation, extreme_stretch, singular_values, volume_ratio
+from .keypair import KeyPair
+from .prepared import PreparedMap
+from .tetmesh import Floats, Ints
+
+# Ratios beyond this say no more than that something is flat.
+_MOST = 1e6
+# Edges below this part of the size have no length to speak of.
+_SHORTEST = 1e-6
+
+
+def measure(
+    prepared: Sequence[PreparedMap], segments: Ints, frames: Floats, values: Sequence[Floats]
+) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
+    """Distortion of all frames, and the worst of it.
+
+    Parameters
+    ----------
+    prepared : sequence of PreparedMap
+        Consecutive pairs of one mesh.
+    segments : (k,)
+        Number of the pair that each frame belongs to.
+    frames : (k, n, 3)
+        Positions in the keys' coordinates.
+    values : sequence of (N, 3)
+        The frames' maps, cube units.
+
+    Returns
+    -------
+    Measures (k, n) by name, see ``VertexMeasures``, and the worst stretch beyond the keys as plain values: ``excess``,
+    the ``frame`` and the ``vertex`` where it is.
+    """
+    vertex_measures = VertexMeasures(prepared)
+    measures: dict[str, NDArray[np.float32]] = {}
+    for index, (number, frame) in enumerate(zip(segments.tolist(), frames, strict=True)):
+        for name, at_vertices in vertex_measures.of(number, frame, values[index]).items():
+            measures.setdefault(name, np.empty(frames.shape[:2], dtype=np.float32))[index] = at_vertices
+    worst = Excess(0.0, 0, 0)
+    for number, part in enumerate(prepared):
+        members = np.flatnonzero(segments == number)
+        found = worst_excess(part.pair, frames[members])
+        if found.ratio > worst.ratio:
+            worst = found._replace(frame=int(members[found.frame]))
+    return measures, {"excess": worst.ratio, "frame": worst.frame, "vertex": worst.vertex}
+
+
+class VertexMeasures:
+    """Measures the frames of one or more consecutive pairs.
+
+    ``stretch``
+        The length ratio of the surface around the vertex that is farthest from 1; above 1 longer, below 1 shorter.
+    ``volume``
+        Volume of the space around the vertex over its volume in the first key.
+    ``dilatation``
+        K = a/c of the map of the space around the vertex, 1 or more.
+
+    Stretch is measured on the triangles. The other two are measured on the map of the volume, whose Jacobians are
+    averaged around each vertex, those inside the object before all; Jacobians of consecutive pairs are multiplied.
+
+    Parameters
+    ----------
+    prepared : sequence of PreparedMap
+        Consecutive pairs of one mesh.
+    """
+
+    def __init__(self, prepared: Sequence[PreparedMap]) -> None:
+        self._prepared = prepared
+        self._count = len(prepared[0].pair.key0)
+        self._faces = prepared[0].pair.faces
+        self._triangles = TriangleStretches(prepared[0].pair.key0, self._faces)
+        self._averages = [_average_at_landmarks(part) for part in prepared]
+        self._before = [np.broadcast_to(np.eye(3), (self._count, 3, 3))]
+        for number, part in enumerate(prepared[:-1]):
+            whole = part.embedding.motion.rotation @ self._jacobians(number, part.mapped)
+            self._before.append(whole @ self._before[-1])
+
+    def of(self, number: int, positions: Floats, values: Floats) -> dict[str, Floats]:
+        """Measures (n,) by name of a frame of pair ``number``.
+
+        Parameters
+        ----------
+        positions : (n, 3)
+            The frame, in the keys' coordinates.
+        values : (N, 3)
+            Its map, cube units.
+        """
+        singular = singular_values(self._jacobians(number, values) @ self._before[number])
+        return {
+            "stretch": self._at_vertices(extreme_stretch(self._triangles.of(positions))),
+            "volume": np.maximum(volume_ratio(singular), 0.0),
+            "dilatation": np.minimum(dilatation(singular), _MOST),
+        }
+
+    def _jacobians(self, number: int, values: Floats) -> Floats:
+        """(n, 3, 3) Jacobians around the vertices of a map of the cube (N, 3)."""
+        jacobians = self._prepared[number].mesh.jacobians(values)
+        return np.asarray((self._averages[number] @ jacobians.reshape(-1, 9)).reshape(-1, 3, 3))
+
+    def _at_vertices(self, ratios: Floats) -> Floats:
+        """(n,) the ratio of the triangles (m,) around each vertex that is farthest from 1; 1 where there are none."""
+        logarithms = np.nan_to_num(np.log(np.clip(ratios, 1.0 / _MOST, _MOST)))
+        largest, smallest = np.zeros(self._count), np.zeros(self._count)
+        corners = self._faces.ravel()
+        np.maximum.at(largest, corners, np.repeat(logarithms, 3))
+        np.minimum.at(smallest, corners, np.repeat(logarithms, 3))
+        return np.exp(np.where(largest >= -smallest, largest, smallest))
+
+
+def _average_at_landmarks(prepared: PreparedMap) -> csr_array:
+    """(n, M) weights that average values of the tetrahedra around the first key's vertices."""
+    mesh = prepared.mesh
+    count = len(mesh.tets)
+    weights = np.repeat(mesh.volumes * prepared.insideness, 4)
+    around = coo_array((weights, (mesh.tets.ravel(), np.repeat(np.arange(count), 4))), shape=(len(mesh.points), count))
+    sums = prepared.landmarks @ around.tocsr()
+    return csr_array(diags_array(1.0 / sums.sum(axis=1)) @ sums)
+
+
+class Excess(NamedTuple):
+    """Where frames stretch or shrink most beyond their keys."""
+
+    ratio: float
+    frame: int
+    vertex: int
+
+
+def worst_excess(pair: KeyPair, frames: Floats) -> Excess:
+    """The edge that leaves the interval between its lengths in the two keys farthest, among frames (k, n, 3).
+
+    ``ratio`` is how far, over the nearer end of that interval: 0 where no edge leaves it.
+    """
+    sides = np.sort(pair.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges = np.unique(np.concatenate([sides, pair.edges]), axis=0)
+    lengths = [np.linalg.norm(key[edges[:, 0]] - key[edges[:, 1]], axis=1) for key in (pair.key0, pair.key1)]
+    shortest, longest = np.minimum(*lengths), np.maximum(*lengths)
+    usable = shortest > _SHORTEST * pair.diagonal
+    edges, shortest, longest = edges[usable], shortest[usable], longest[usable]
+    worst = Excess(0.0, 0, 0)
+    for number, frame in enumerate(frames):
+        length = np.linalg.norm(frame[edges[:, 0]] - frame[edges[:, 1]], axis=1)
+        excess = np.maximum(length / longest - 1.0, 1.0 - length / shortest)
+        edge = int(np.argmax(excess)) if len(excess) else 0
+        if len(excess) and excess[edge] > worst.ratio:
+            worst = Excess(float(excess[edge]), number, int(edges[edge, 0]))
+    return worst

@@ -7,8 +7,9 @@ from __future__ import annotations
 import bpy
 
 from ..solver.errors import InputError
-from . import checks, shape_keys, slider
+from . import checks, heat_map, kept_measures, shape_keys, slider
 from .operators.bake_inbetweens import QC3D_OT_rebake
+from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 from .records import Chain, Record
@@ -58,11 +59,24 @@ def _draw_chain(
             text=f"Folds {result['folds']}, new crossings {result['crossings']}",
             icon='CHECKMARK' if clean else 'ERROR',
         )
-        worst = result.get("worst")
-        if worst:
-            facts.label(text=f"Worst stretch {worst['stretch']:.2f} at step {worst['step']}")
         facts.label(text=f"Residual {result['residual']:.1e} of the size")
         for note in result["notes"]:
             draw_sentence(context, layout, note)
+        _draw_distortion(layout, obj, chain)
     buttons = layout.row(align=True)
     buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
+
+
+def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain) -> None:
+    worst = chain.result.get("worst")
+    if worst:
+        row = layout.row(align=True)
+        row.label(text=f"Worst stretch {worst['excess']:.1%} beyond the keys, at {worst['at']:.2f}")
+        row.operator(QC3D_OT_select_worst.bl_idname, text="", icon='RESTRICT_SELECT_OFF').slider = chain.slider
+    if kept_measures.has(obj.data.shape_keys, chain.slider):
+        state = heat_map.shown(obj)
+        row = layout.row(align=True)
+        row.prop(obj.qc3d, "measure", text="")
+        is_shown = state is not None and (state.slider, state.measure) == (chain.slider, obj.qc3d.measure)
+        button = row.operator(QC3D_OT_heat_map.bl_idname, icon='SHADING_RENDERED', depress=is_shown)
+        button.slider, button.measure = chain.slider, obj.qc3d.measure

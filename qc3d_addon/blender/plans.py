@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..solver.easing import eased
 from ..solver.errors import InputError
-from . import checks, mesh_data, names, shape_keys
+from . import checks, heat_map, kept_measures, mesh_data, names, shape_keys
 from .records import Chain, KeptMap, Record
 from .requests import BakeRequest, BakeResult
 
@@ -157,10 +157,13 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         "notes": notes,
     }
     chain.request = request.remembered()
-    chain.result = _result(report, chosen)
+    chain.result = _result(report, bake.times, chosen)
+    measures = {name: values[chosen] for name, values in bake.measures.items()}
+    kept_measures.keep(keys, chain.slider, measures)
     record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
     _keep_maps(keys, record, plan, outcome)
     record.write(keys)
+    heat_map.refresh(obj, chain)
     return BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
 
 
@@ -201,15 +204,16 @@ def _chosen_steps(bake: Bake, request: BakeRequest) -> NDArray[np.int64]:
     return np.arange(0, len(bake.times), (len(bake.times) - 1) // (steps * pairs))
 
 
-def _result(report: dict[str, Any], chosen: NDArray[np.int64]) -> dict[str, Any]:
+def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[np.int64]) -> dict[str, Any]:
     """What the panel shows of a bake."""
-    frames = {name: [report[name][step] for step in chosen] for name in ("crossings", "certificates")}
+    worst = report["worst_stretch"]
     return {
         "count": len(chosen) - 2,
         "engine": report["engine"],
         "seconds": sum(report["seconds"].values()),
         "folds": sum(report["folds"]["frames"][step] for step in chosen),
-        "crossings": sum(frames["crossings"]),
+        "crossings": sum(report["crossings"][step] for step in chosen),
+        "worst": {"excess": worst["excess"], "at": float(times[worst["frame"]]), "vertex": worst["vertex"]},
         "residual": report["residual"]["rms"],
         "notes": report["notes"],
     }

@@ -11,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.settings import Settings
+from .heat_colours import MEASURE_ITEMS
 from .names import MAX_STEPS
 from .requests import BakeRequest
 
@@ -141,6 +142,8 @@ class BakeChoices(MapChoices):
 
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
+
+    measure: EnumProperty(name="Measure", description="What the heat map shows", items=MEASURE_ITEMS)
 
 
 # Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class

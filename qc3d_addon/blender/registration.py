@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import bpy
 
-from . import cli, compat, jobs, panel_results, panels, preferences, presets, properties
+from . import cli, compat, jobs, legend, panel_results, panels, preferences, presets, properties
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from .operators.cancel import QC3D_OT_cancel
+from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
 
@@ -20,6 +21,8 @@ CLASSES = (
     QC3D_OT_bake_inbetweens,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
+    QC3D_OT_heat_map,
+    QC3D_OT_select_worst,
     QC3D_OT_add_inner_key,
     QC3D_OT_remove_inner_key,
     presets.QC3D_MT_presets,
@@ -37,6 +40,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
     jobs.register()
+    legend.register()
     _commands.extend(compat.register_command("qc3d", cli.run_command))
 
 
@@ -44,6 +48,7 @@ def unregister() -> None:
     """Undo ``register`` in reverse order."""
     while _commands:
         compat.unregister_command(_commands.pop())
+    legend.unregister()
     jobs.unregister()
     del bpy.types.Object.qc3d
     for cls in reversed(CLASSES):

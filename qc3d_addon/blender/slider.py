@@ -53,13 +53,18 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float) -> bool:
 def drive(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str, step: int, intervals: int) -> None:
     """Drive the value of a shape key by the slider."""
     curve = compat.new_driver(key.id_data, value_path(key.name))
-    curve.driver.type = 'SCRIPTED'
-    variable = curve.driver.variables.new()
+    read_slider(curve.driver, obj, name)
+    curve.driver.expression = expression(step, intervals)
+
+
+def read_slider(driver: bpy.types.Driver, obj: bpy.types.Object, name: str) -> None:
+    """Give a new driver the slider as the variable that its expression can use."""
+    driver.type = 'SCRIPTED'
+    variable = driver.variables.new()
     variable.name = VARIABLE
     variable.type = 'SINGLE_PROP'
     variable.targets[0].id = obj
     variable.targets[0].data_path = data_path(name)
-    curve.driver.expression = expression(step, intervals)
 
 
 def undrive(key: bpy.types.ShapeKey) -> None:

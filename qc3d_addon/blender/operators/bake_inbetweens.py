@@ -7,16 +7,12 @@
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import StringProperty
 
-from ...solver.errors import InputError
-from .. import checks
 from ..plans import Plan, plan_bake, write_bake
 from ..properties import BakeChoices, bake_request, fill_from_panel
-from ..records import Record
 from ..requests import BakeRequest
 from .child_work import ChildWork
-from .common import poll_active_object, poll_panel_keys
+from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
 
 if TYPE_CHECKING:
     from ...solver.task import Outcome
@@ -48,24 +44,15 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
     bl_idname = "qc3d.rebake"
     bl_label = "Re-Bake"
 
-    slider: StringProperty(
-        name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
-    )
+    slider: SLIDER
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not poll_active_object(cls, context):
-            return False
-        if not checks.has_chains(context.active_object.data.shape_keys):
-            cls.poll_message_set(f"'{context.active_object.name}' has no in-betweens yet; bake some first.")
-            return False
-        return True
+        return poll_chains(cls, context)
 
     def plan(self, context: bpy.types.Context) -> Plan:
-        obj = checks.require_object(context.active_object)
-        chain = Record.read(obj.data.shape_keys).chain_of_slider(self.slider)
-        if chain is None:
-            raise InputError(f"'{obj.name}' has no in-betweens with the slider '{self.slider}'.")
+        obj = context.active_object
+        chain = chosen_chain(obj, self.slider)
         return plan_bake(obj, BakeRequest.again(chain.through, chain.request))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:

@@ -5,9 +5,16 @@
 from __future__ import annotations
 
 import bpy
+from bpy.props import StringProperty
 
+from ...solver.errors import InputError
 from .. import checks, jobs
 from ..properties import key_names
+from ..records import Chain, Record
+
+SLIDER = StringProperty(
+    name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
+)
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -21,6 +28,31 @@ def poll_panel_keys(operator: type[bpy.types.Operator], context: bpy.types.Conte
         return True
     obj = context.active_object
     return _poll(operator, checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d)))
+
+
+def poll_chains(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether the active object has in-betweens to work on now."""
+    if not poll_active_object(operator, context):
+        return False
+    obj = context.active_object
+    has_any = checks.has_chains(obj.data.shape_keys)
+    return _poll(operator, None if has_any else f"'{obj.name}' has no in-betweens yet; bake some first.")
+
+
+def chosen_chain(obj: bpy.types.Object | None, slider: str) -> Chain:
+    """The in-betweens of a slider, the newest where the name is empty.
+
+    Raises
+    ------
+    InputError
+        If the object has none of that name.
+    """
+    obj = checks.require_object(obj)
+    chain = Record.read(obj.data.shape_keys).chain_of_slider(slider)
+    if chain is None:
+        which = f" with the slider '{slider}'" if slider else ""
+        raise InputError(f"'{obj.name}' has no in-betweens{which}; bake some first.")
+    return chain
 
 
 def _poll(operator: type[bpy.types.Operator], problem: str | None) -> bool:

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours of the heat map and the range of values that they stand for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[float, float, float]
+
+# Blue, grey and red can be told apart by nearly everyone; both arms are equally dark. Sampled from hues of equal steps
+# in lightness (see Moreland 2009, "Diverging color maps for scientific visualization").
+_DIVERGING: tuple[Colour, ...] = (
+    (0.13, 0.31, 0.65), (0.42, 0.62, 0.85), (0.87, 0.87, 0.87), (0.90, 0.57, 0.45), (0.70, 0.10, 0.16),
+)  # fmt: skip
+# From grey through orange to dark red.
+_SEQUENTIAL: tuple[Colour, ...] = (
+    (0.87, 0.87, 0.87), (0.95, 0.78, 0.52), (0.90, 0.52, 0.30), (0.75, 0.25, 0.25), (0.45, 0.05, 0.25),
+)  # fmt: skip
+
+# Blender's menu of the measures.
+MEASURE_ITEMS = (
+    ("stretch", "Stretch", "Length of the surface over its length in the first key"),
+    ("volume", "Volume", "Volume of the space around a vertex over its volume in the first key"),
+    ("dilatation", "Dilatation", "How unevenly space around a vertex is stretched: longest over shortest axis"),
+)
+
+# Ends of the scale that read well; the first that holds nearly all values is taken.
+_ENDS = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
+_HELD = 99.0  # percent of the vertices, in the frame that is distorted most
+
+
+class Scale(NamedTuple):
+    """What the colours of a measure stand for, from ``low`` to ``high``, evenly in the logarithm."""
+
+    title: str
+    low: float
+    high: float
+    colours: tuple[Colour, ...]
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Places along the scale, 0..1, and the values there."""
+        values = (self.low, 1.0, self.high) if self.low < 1.0 else (1.0, self.high**0.5, self.high)
+        return [(place, f"{value:.3g}") for place, value in zip((0.0, 0.5, 1.0), values, strict=True)]
+
+
+_TITLES = {
+    "stretch": "Stretch: length / length in the first key",
+    "volume": "Volume / volume in the first key",
+    "dilatation": "Dilatation K: longest / shortest axis",
+}
+
+
+def scale_of(measure: str, values: NDArray[np.float32]) -> Scale:
+    """The scale that shows the values (k, n) of a measure."""
+    away = np.percentile(np.abs(np.log(np.maximum(values, 1e-6))), _HELD, axis=1).max()
+    end = next((end for end in _ENDS if np.log(end) >= away), _ENDS[-1])
+    if measure == "dilatation":
+        return Scale(_TITLES[measure], 1.0, end, _SEQUENTIAL)
+    return Scale(_TITLES[measure], 1.0 / end, end, _DIVERGING)
+
+
+def linear(colour: Colour) -> Colour:
+    """A colour of the screen (sRGB) as Blender's attributes hold it."""
+    red, green, blue = (
+        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour
+    )
+    return red, green, blue

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The distortion of a bake's frames, kept small with the shape keys until a heat map asks for it."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+import zlib
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .names import MAX_STEPS
+from .records import PROPERTY
+
+MEASURES = ("stretch", "volume", "dilatation")
+
+_HEADER = struct.Struct("<4sII")  # what it is, number of frames, number of vertices
+_MAGIC = b"QCM1"
+
+Measures = dict[str, NDArray[np.float32]]
+
+
+def keep(keys: bpy.types.Key, slider: str, measures: Measures) -> None:
+    """Keep measures (k, n) by name, rounded to a thousandth or so; all are ratios of 0 or more."""
+    count, vertices = measures[MEASURES[0]].shape
+    logarithms = np.log2(np.clip(np.stack([measures[name] for name in MEASURES]), 2.0**-20, 2.0**20))
+    data = zlib.compress(np.ascontiguousarray(logarithms, dtype="<f2").tobytes(), 6)
+    # Blender cuts bytes at their first zero where they overwrite bytes; a new property keeps them whole.
+    forget(keys, slider)
+    keys[_property(slider)] = _HEADER.pack(_MAGIC, count, vertices) + data
+
+
+def read(keys: bpy.types.Key, slider: str, vertices: int) -> Measures | None:
+    """What was kept for a slider, None where there is nothing that fits a mesh of so many vertices."""
+    data = keys.get(_property(slider))
+    if not isinstance(data, bytes) or len(data) < _HEADER.size:
+        return None
+    magic, count, kept_vertices = _HEADER.unpack_from(data)
+    if magic != _MAGIC or kept_vertices != vertices or not 2 <= count <= MAX_STEPS + 1:
+        return None
+    size = 2 * len(MEASURES) * count * vertices
+    try:
+        raw = zlib.decompressobj().decompress(data[_HEADER.size :], size + 1)
+    except zlib.error:
+        return None
+    if len(raw) != size:
+        return None
+    logarithms = np.frombuffer(raw, dtype="<f2").reshape(len(MEASURES), count, vertices)
+    values = np.exp2(logarithms.astype(np.float32))
+    return dict(zip(MEASURES, values, strict=True)) if np.isfinite(values).all() else None
+
+
+def forget(keys: bpy.types.Key, slider: str) -> None:
+    """Remove what was kept for a slider."""
+    keys.pop(_property(slider), None)
+
+
+def has(keys: bpy.types.Key, slider: str) -> bool:
+    """Whether something is kept for a slider. Quick enough for a panel."""
+    return _property(slider) in keys
+
+
+def _property(slider: str) -> str:
+    return f"{PROPERTY}_measures_{hashlib.sha256(slider.encode()).hexdigest()[:16]}"

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators that show where in-betweens are distorted."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from typing import ClassVar
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...solver.errors import QC3DError
+from .. import heat_map, legend
+from ..heat_colours import MEASURE_ITEMS
+from ..shape_keys import owned_keys, slider_owner
+from .common import SLIDER, chosen_chain, poll_chains
+
+
+class QC3D_OT_heat_map(bpy.types.Operator):
+    """Show by colours where the in-betweens are stretched, or hide that again"""
+
+    bl_idname = "qc3d.heat_map"
+    bl_label = "Heat Map"
+    bl_options: ClassVar[set[str]] = {"UNDO"}
+
+    slider: SLIDER
+    measure: EnumProperty(
+        name="Measure",
+        description="What the colours show",
+        items=MEASURE_ITEMS,
+        default="stretch",
+        options={"SKIP_SAVE"},
+    )
+    show: EnumProperty(
+        name="Show",
+        description="Whether to show the heat map",
+        items=[
+            ("toggle", "Toggle", "Hide it where it is shown, else show it"),
+            ("on", "On", "Show it"),
+            ("off", "Off", "Hide it"),
+        ],
+        default="toggle",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.active_object
+        try:
+            chain = chosen_chain(obj, self.slider)
+            state = heat_map.shown(obj)
+            is_same = state is not None and (state.slider, state.measure) == (chain.slider, self.measure)
+            if self.show == "off" or (self.show == "toggle" and is_same):
+                heat_map.hide(obj)
+                legend.leave(context)
+            else:
+                heat_map.show(obj, chain, self.measure)
+                legend.enter(context)
+        except QC3DError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class QC3D_OT_select_worst(bpy.types.Operator):
+    """Go to where the in-betweens stretch or shrink most beyond their keys: slider, cursor and selection"""
+
+    bl_idname = "qc3d.select_worst"
+    bl_label = "Select Worst Place"
+    bl_options: ClassVar[set[str]] = {"UNDO"}
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.active_object
+        try:
+            chain = chosen_chain(obj, self.slider)
+        except QC3DError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        worst = chain.result.get("worst")
+        mesh = obj.data
+        if not worst or not 0 <= worst["vertex"] < len(mesh.vertices):
+            self.report({"ERROR"}, f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")
+            return {"CANCELLED"}
+        owner = slider_owner(obj, chain)
+        if chain.slider in owner:
+            owner[chain.slider] = worst["at"]
+            owner.update_tag()
+        # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
+        steps = owned_keys(mesh.shape_keys, chain)
+        if steps:
+            nearest = min(steps, key=lambda step: abs(step - worst["at"] * chain.intervals))
+            obj.active_shape_key_index = mesh.shape_keys.key_blocks.find(steps[nearest].name)
+        _select(mesh, worst["vertex"])
+        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+        if len(evaluated.data.vertices) == len(mesh.vertices):  # no modifier adds vertices
+            context.scene.cursor.location = evaluated.matrix_world @ evaluated.data.vertices[worst["vertex"]].co
+        if context.space_data is not None and context.space_data.type == "VIEW_3D":
+            context.space_data.region_3d.view_location = context.scene.cursor.location
+        self.report({"INFO"}, f"Vertex {worst['vertex']} at {worst['at']:.2f}: {worst['excess']:.1%} beyond the keys.")
+        return {"FINISHED"}
+
+
+def _select(mesh: bpy.types.Mesh, vertex: int) -> None:
+    """Select a vertex and the edges and faces around it."""
+    ends = np.empty(2 * len(mesh.edges), dtype=np.int32)
+    mesh.edges.foreach_get("vertices", ends)
+    around = np.unique(ends.reshape(-1, 2)[(ends.reshape(-1, 2) == vertex).any(axis=1)])
+    chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    chosen[vertex] = chosen[around] = True
+    mesh.vertices.foreach_set("select", chosen)
+    mesh.edges.foreach_set("select", chosen[ends.reshape(-1, 2)].all(axis=1))
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    if len(starts):
+        mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corners], starts))
+    mesh.update()

@@ -13,20 +13,16 @@ from contextlib import ExitStack
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
-from typing import NoReturn, get_args
+from typing import NoReturn
 
-from .commands import reconstruct
+from .commands import analyze, reconstruct
+from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing, write_frames
-from .solver.easing import Easing
 from .solver.errors import InputError, QC3DError, naming_pair
 from .solver.pipeline import chain_inbetweens, evenly_spaced, finish, prepare
-from .solver.settings import Engine, Mode, Quality, Settings
-from .solver.stretch import StretchLaw
 
 MOST_FRAMES = 10_000
-
-_DEFAULTS = Settings()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _interpolate(arguments: argparse.Namespace) -> None:
-    settings = _settings(arguments)
+    settings = settings_of(arguments)
     _require_distinct_files(arguments.pair, arguments.output, arguments.report)
     names = _key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
@@ -83,7 +79,7 @@ def _bake(arguments: argparse.Namespace) -> None:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     _require_distinct_files(arguments.file, arguments.report)
     _require_distinct_files(arguments.output, arguments.report)
-    request = BakeRequest(_key_names(arguments), arguments.frames, _settings(arguments), arguments.keyframes)
+    request = BakeRequest(_key_names(arguments), arguments.frames, settings_of(arguments), arguments.keyframes)
     with StageBars() as bars:
         result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)
     _print_notes(result.notes)
@@ -96,11 +92,6 @@ def _print_notes(notes: Iterable[str]) -> None:
 
 def _key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
     return (arguments.first, *arguments.via, arguments.last)
-
-
-def _settings(arguments: argparse.Namespace) -> Settings:
-    names = ("mode", "stretch", "easing", "extra_turns", "engine", "quality", "seed")
-    return Settings(**{name: getattr(arguments, name) for name in names})
 
 
 def _require_distinct_files(*paths: Path | None) -> None:
@@ -120,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
         "pair", type=Path, metavar="PAIR.npz", help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3)"
     )
     _add_keys(interpolate, "shape", "FRAMES.npz", "faces, frames, times, key0, key1")
-    _add_settings(interpolate)
+    add_settings(interpolate)
     interpolate.set_defaults(run=_interpolate)
 
     bake = commands.add_parser("bake", help="in-between shape keys in a .blend file")
@@ -129,15 +120,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_keys(bake, "shape key", "OUT.blend", "the file with the in-betweens; may be the file itself")
     bake.add_argument(
         "--keyframes",
-        type=_whole_number,
+        type=whole_number,
         nargs=2,
         metavar=("FIRST", "LAST"),
         help="animate the slider over these frames",
     )
-    _add_settings(bake)
+    add_settings(bake)
     bake.set_defaults(run=_bake)
 
-    for command in (reconstruct,):
+    for command in (analyze, reconstruct):
         command.add_to(commands)
     return parser
 
@@ -155,44 +146,11 @@ def _add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents
     command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
 
 
-def _add_settings(command: argparse.ArgumentParser) -> None:
-    for name, choices, text in (
-        ("mode", get_args(Mode), "how in-betweens are made"),
-        ("stretch", get_args(StretchLaw), "how mode natural interpolates stretches"),
-        ("easing", get_args(Easing), "how far along the way the in-betweens are"),
-        ("engine", get_args(Engine), "what fills the volume around the mesh"),
-        ("quality", get_args(Quality), "how fine the volume is"),
-    ):
-        default = getattr(_DEFAULTS, name)
-        command.add_argument(f"--{name}", choices=choices, default=default, help=f"{text} (default: {default})")
-    command.add_argument(
-        "--extra-turns",
-        type=_whole_number,
-        default=_DEFAULTS.extra_turns,
-        metavar="TURNS",
-        help="full turns that two shapes cannot tell (default: 0)",
-    )
-    command.add_argument(
-        "--seed",
-        type=_whole_number,
-        default=_DEFAULTS.seed,
-        metavar="S",
-        help="of the delaunay engine's samples (default: 0)",
-    )
-
-
 def _frame_count(text: str) -> int:
-    count = _whole_number(text)
+    count = whole_number(text)
     if not 0 <= count <= MOST_FRAMES:
         raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")
     return count
-
-
-def _whole_number(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
 
 
 def _version() -> str:

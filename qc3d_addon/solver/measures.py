@@ -116,7 +116,7 @@ class VertexMeasures:
         corners = self._faces.ravel()
         np.maximum.at(largest, corners, np.repeat(logarithms, 3))
         np.minimum.at(smallest, corners, np.repeat(logarithms, 3))
-        return np.exp(np.where(largest >= -smallest, largest, smallest))
+        return np.asarray(np.exp(np.where(largest >= -smallest, largest, smallest)))
 
 
 def _average_at_landmarks(prepared: PreparedMap) -> csr_array:

@@ -36,17 +36,34 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
 
 def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
     """The F-curve that animates a property of ``owner`` in its active action, if there is one."""
+    curves = _fcurves(owner)
+    return None if curves is None else curves.find(data_path)
+
+
+def remove_fcurve(owner: bpy.types.ID, data_path: str) -> None:
+    """Remove the F-curve of a property, and the action with it where it holds nothing else and nobody else uses it."""
+    curves = _fcurves(owner)
+    assert curves is not None
+    curves.remove(curves.find(data_path))
+    action = owner.animation_data.action
+    if not len(curves) and action.users == 1 and not action.use_fake_user:
+        owner.animation_data.action = None
+        bpy.data.actions.remove(action)
+
+
+def _fcurves(owner: bpy.types.ID) -> bpy.types.bpy_prop_collection | None:
+    """The F-curves of ``owner`` in its active action."""
     animation = owner.animation_data
     if animation is None or animation.action is None:
         return None
     if not hasattr(animation, "action_slot"):  # before 4.4 an action holds its curves itself
-        return animation.action.fcurves.find(data_path)
+        return animation.action.fcurves
     if animation.action_slot is None:
         return None
     from bpy_extras import anim_utils
 
     channels = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
-    return None if channels is None else channels.fcurves.find(data_path)
+    return None if channels is None else channels.fcurves
 
 
 def ensure_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:

@@ -9,10 +9,25 @@ import bpy
 from ..solver.errors import InputError
 from . import checks, heat_map, kept_measures, shape_keys, slider
 from .operators.bake_inbetweens import QC3D_OT_rebake
+from .operators.chains import (
+    QC3D_OT_absolute_keys,
+    QC3D_OT_export_alembic,
+    QC3D_OT_mirror,
+    QC3D_OT_remove,
+    QC3D_OT_to_keyframes,
+)
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 from .records import Chain, Record
+
+_MORE = (
+    (QC3D_OT_mirror, 'MOD_MIRROR'),
+    (QC3D_OT_to_keyframes, 'KEYFRAME'),
+    (QC3D_OT_absolute_keys, 'DUPLICATE'),
+    (QC3D_OT_export_alembic, 'EXPORT'),
+    (QC3D_OT_remove, 'TRASH'),
+)
 
 
 class QC3D_PT_results(bpy.types.Panel):
@@ -65,6 +80,12 @@ def _draw_chain(
         _draw_distortion(layout, obj, chain)
     buttons = layout.row(align=True)
     buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
+    header, more = layout.panel(f"QC3D_more_{chain.slider}", default_closed=True)
+    header.label(text="More")
+    if more is not None:
+        column = more.column(align=True)
+        for operator, icon in _MORE:
+            column.operator(operator.bl_idname, icon=icon).slider = chain.slider
 
 
 def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain) -> None:

@@ -9,6 +9,13 @@ import bpy
 from . import cli, compat, jobs, legend, panel_results, panels, preferences, presets, properties
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from .operators.cancel import QC3D_OT_cancel
+from .operators.chains import (
+    QC3D_OT_absolute_keys,
+    QC3D_OT_export_alembic,
+    QC3D_OT_mirror,
+    QC3D_OT_remove,
+    QC3D_OT_to_keyframes,
+)
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.prepare import QC3D_OT_prepare
@@ -23,6 +30,11 @@ CLASSES = (
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
     QC3D_OT_select_worst,
+    QC3D_OT_remove,
+    QC3D_OT_to_keyframes,
+    QC3D_OT_absolute_keys,
+    QC3D_OT_mirror,
+    QC3D_OT_export_alembic,
     QC3D_OT_add_inner_key,
     QC3D_OT_remove_inner_key,
     presets.QC3D_MT_presets,

@@ -170,6 +170,16 @@ def write_chain(
     return notes
 
 
+def remove_keys(obj: bpy.types.Object, chain: Chain) -> None:
+    """Remove the shape keys of a chain; the active key stays active where it is not one of them."""
+    active, stale = obj.active_shape_key, list(owned_keys(obj.data.shape_keys, chain).values())
+    active = None if active in stale else active
+    for key in stale:
+        _remove_key(obj, key)
+    _activate(obj, active)
+    obj.data.shape_keys.update_tag()
+
+
 def _new_key(obj: bpy.types.Object, name: str, undo: ExitStack) -> bpy.types.ShapeKey:
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)

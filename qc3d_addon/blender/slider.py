@@ -91,6 +91,15 @@ def driven_by(keys: bpy.types.Key, name: str) -> dict[str, bpy.types.Driver]:
     return {curve.data_path: curve.driver for curve in keys.animation_data.drivers if _reads(curve.driver, name)}
 
 
+def reads(driver: bpy.types.Driver, obj: bpy.types.Object, name: str) -> bool:
+    """Whether a driver of any kind reads the slider of ``obj``."""
+    return any(
+        target.id == obj and target.data_path == data_path(name)
+        for variable in driver.variables
+        for target in variable.targets
+    )
+
+
 def _reads(driver: bpy.types.Driver, name: str) -> bool:
     variables = driver.variables
     return (

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators that do something with in-betweens that were baked."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy.props import BoolProperty, IntProperty, StringProperty
+
+from ...solver.errors import InputError, QC3DError
+from .. import absolute, keyframing, mirroring, point_cache, removal
+from ..records import Chain, Record
+from .common import SLIDER, chosen_chain, poll_chains
+
+_MOST_FRAMES = 100_000
+
+
+class ChainWork:
+    """Does something with the chosen chain at once; an operator says what by ``work``."""
+
+    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        """Do it; sentences for the user, the last of them what was done. Raises QC3DError with nothing changed."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.active_object
+        try:
+            slider = chosen_chain(obj, self.slider).slider
+            record = Record.read(obj.data.shape_keys)
+            chain = record.chain_of_slider(slider)
+            *notes, done = self.work(context, obj, record, chain)
+        except QC3DError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        for note in notes:
+            self.report({'WARNING'}, note)
+        self.report({'INFO'}, done)
+        return {'FINISHED'}
+
+
+class QC3D_OT_remove(ChainWork, bpy.types.Operator):
+    """Remove these in-betweens: their shape keys, drivers, slider, and the keyframes that the bake made"""
+
+    bl_idname = "qc3d.remove"
+    bl_label = "Remove"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        notes = removal.remove_chain(obj, record, chain)
+        return [*notes, f"The in-betweens of '{chain.slider}' were removed."]
+
+
+class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
+    """Turn what the slider does over a range of frames into keyframes of the shape keys, without drivers"""
+
+    bl_idname = "qc3d.to_keyframes"
+    bl_label = "Bake to Keyframes"
+
+    slider: SLIDER
+    frame_start: IntProperty(
+        name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
+    )
+    frame_end: IntProperty(name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        for name in ("frame_start", "frame_end"):
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(context.scene, name))
+        frames = range(self.frame_start, self.frame_end + 1)
+        if not 2 <= len(frames) <= _MOST_FRAMES:
+            first, last = self.frame_start, self.frame_end
+            raise InputError(f"Frames {first} to {last} are not possible; choose 2 to {_MOST_FRAMES} frames.")
+        notes = keyframing.bake_to_keyframes(context, obj, record, chain, frames)
+        return [*notes, f"The shape keys of '{chain.slider}' have keyframes from {frames[0]} to {frames[-1]}."]
+
+
+class QC3D_OT_absolute_keys(ChainWork, bpy.types.Operator):
+    """Make a copy of the object whose absolute shape keys are these in-betweens, played by its evaluation time"""
+
+    bl_idname = "qc3d.absolute_keys"
+    bl_label = "Copy with Absolute Keys"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        copy = absolute.copy_with_absolute_keys(obj, chain)
+        return [f"'{copy.name}' has {chain.intervals + 1} absolute keys; the slider of '{obj.name}' plays them."]
+
+
+class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
+    """Make these in-betweens for the other side of a symmetric mesh, with a slider of their own"""
+
+    bl_idname = "qc3d.mirror"
+    bl_label = "Mirror"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        mirrored = mirroring.mirror_chain(obj, record, chain)
+        return [f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
+
+
+class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
+    """Write these in-betweens as an Alembic file, the slider going from 0 to 1"""
+
+    bl_idname = "qc3d.export_alembic"
+    bl_label = "Export Alembic"
+    bl_options: ClassVar[set[str]] = {'REGISTER'}  # nothing in the file changes
+
+    slider: SLIDER
+    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+    check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+    filter_glob: StringProperty(default="*.abc", options={'HIDDEN', 'SKIP_SAVE'})
+    frames: IntProperty(
+        name="Frames", description="Frames from the first key to the last", default=25, min=2, max=_MOST_FRAMES
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = f"{bpy.path.clean_name(context.active_object.name)}.abc"
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        if not self.filepath:
+            raise InputError("Name a file to write to.")
+        path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".abc"))
+        point_cache.export_alembic(context, obj, chain, path, self.frames)
+        return [f"{path.name} has '{obj.name}' in {self.frames} frames."]

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""*Re-Bake*: the same choices again after keys were sculpted, with everything hung on the slider kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from qc3d_addon.blender import compat
+from qc3d_addon.blender.records import PROPERTY, Record
+
+pytestmark = pytest.mark.usefixtures("quick_map")
+
+SLIDER = "Basis→Lean"
+State = Callable[[], dict[str, Any]]
+ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
+
+
+@pytest.fixture
+def baked(figure: bpy.types.Object) -> bpy.types.Object:
+    choices = {"mode": "linear", "count": 2, "easing": "ease-in", "seed": 7, "use_keyframes": True}
+    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    return figure
+
+
+@pytest.mark.parametrize("key", ["Basis", "Lean"])
+def test_everything_but_the_shapes_is_kept(baked: bpy.types.Object, shapes: ReadShapes, key: str) -> None:
+    lamp = bpy.data.objects.new("Lamp", None)
+    bpy.context.collection.objects.link(lamp)
+    variable = lamp.driver_add("location", 0).driver.variables.new()
+    variable.targets[0].id = baked
+    variable.targets[0].data_path = f'["{SLIDER}"]'
+    baked.data.shape_keys.key_blocks["Basis→Lean 1/3"].name = "Renamed"
+    baked.data.shape_keys.key_blocks["Basis→Lean 2/3"].slider_max = 0.8
+    names = list(shapes(baked))
+    curve = compat.find_fcurve(baked, f'["{SLIDER}"]')
+    assert curve is not None
+    points = [point.co[:] for point in curve.keyframe_points]
+    before = shapes(baked)
+    for point in baked.data.shape_keys.key_blocks[key].points:
+        point.co.y += 0.3 * point.co.z
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+    after = shapes(baked)
+    assert list(after) == names
+    assert np.abs(after["Renamed"] - before["Renamed"]).max() > 0.01
+    np.testing.assert_array_equal(after["Basis→Lean 3/3"], after["Lean"])
+    assert baked.data.shape_keys.key_blocks["Basis→Lean 2/3"].slider_max == np.float32(0.8)
+    curve = compat.find_fcurve(baked, f'["{SLIDER}"]')
+    assert curve is not None
+    assert [point.co[:] for point in curve.keyframe_points] == points
+    assert lamp.animation_data.drivers[0].driver.variables[0].targets[0].id == baked
+
+
+def test_the_choices_are_those_of_the_bake_and_not_of_the_panel(baked: bpy.types.Object, quick_map: list[Any]) -> None:
+    baked.qc3d.count, baked.qc3d.easing = 9, "linear"
+    baked.data.shape_keys.key_blocks["Lean"].points[0].co.x += 0.1
+    before = Record.read(baked.data.shape_keys).chains[0].request
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+    assert Record.read(baked.data.shape_keys).chains[0].request == before
+    assert quick_map[-1].seed == 7
+    assert len(Record.read(baked.data.shape_keys).chains[0].keys) == 3
+
+
+def test_the_one_that_is_named_or_the_newest(baked: bpy.types.Object, shapes: ReadShapes) -> None:
+    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch", mode="linear", count=1)
+    before = shapes(baked)
+    for name in ("Lean", "Stretch"):
+        baked.data.shape_keys.key_blocks[name].points[0].co.x += 0.5
+    bpy.ops.qc3d.rebake(slider=SLIDER)
+    middle = shapes(baked)
+    assert np.abs(middle["Basis→Lean 3/3"] - before["Basis→Lean 3/3"]).max() > 0.4
+    np.testing.assert_array_equal(middle["Basis→Stretch 2/2"], before["Basis→Stretch 2/2"])
+    bpy.ops.qc3d.rebake(slider="Basis→Stretch")
+    assert np.abs(shapes(baked)["Basis→Stretch 2/2"] - before["Basis→Stretch 2/2"]).max() > 0.4
+
+
+def test_a_record_of_an_older_version(baked: bpy.types.Object, state: State) -> None:
+    keys = baked.data.shape_keys
+    stored = json.loads(keys[PROPERTY])
+    for chain in stored["chains"]:
+        del chain["request"], chain["result"]
+    keys[PROPERTY] = json.dumps(stored)
+    before = state()
+    with pytest.raises(RuntimeError, match="not known any more; bake anew"):
+        bpy.ops.qc3d.rebake()
+    assert state() == before
+    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="linear", count=2) == {"FINISHED"}
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+
+
+def test_a_key_that_was_deleted(baked: bpy.types.Object, state: State) -> None:
+    baked.data.shape_keys.key_blocks["Lean"].name = "Other"
+    before = state()
+    with pytest.raises(RuntimeError, match="There is no shape key 'Lean'"):
+        bpy.ops.qc3d.rebake()
+    assert state() == before

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""As few in-betweens as a tolerance needs, as shape keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from qc3d_addon.blender.requests import DENSE_STEPS
+
+SLIDER = "Basis→Bent"
+ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
+
+pytestmark = pytest.mark.usefixtures("work_here")
+
+
+@pytest.fixture
+def bar() -> bpy.types.Object:
+    """The active object "Bar": a box of height 4 whose upper half bends by 60 degrees."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=8, radius=0.4, depth=4.0)
+    obj = bpy.context.active_object
+    obj.name = "Bar"
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide(number_cuts=6)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.shape_key_add(name="Basis", from_mix=False)
+    bent = obj.shape_key_add(name="Bent", from_mix=False)
+    bent.value = 0.0
+    for point in bent.points:
+        angle = np.radians(60.0) * np.clip(point.co.z / 2.0, 0.0, 1.0)
+        height = max(point.co.z, 0.0)
+        x, low = point.co.x, min(point.co.z, 0.0)
+        point.co.x = x * np.cos(angle) + height * np.sin(angle) * 0.8
+        point.co.z = low - x * np.sin(angle) + height * np.cos(angle * 0.8)
+    return obj
+
+
+def bake(tolerance: float, **choices: Any) -> None:
+    found = bpy.ops.qc3d.bake_inbetweens(
+        from_key="Basis", to_key="Bent", use_tolerance=True, tolerance=tolerance, engine='delaunay',
+        quality='draft', **choices,
+    )  # fmt: skip
+    assert found == {"FINISHED"}
+
+
+def steps(obj: bpy.types.Object) -> int:
+    return len([key for key in obj.data.shape_keys.key_blocks if key.name.startswith(SLIDER)])
+
+
+def test_smaller_tolerances_need_more_and_both_are_kept(bar: bpy.types.Object, shapes: ReadShapes) -> None:
+    counts = []
+    for tolerance in (10.0, 0.05, 0.005):
+        bake(tolerance)
+        counts.append(steps(bar))
+        assert DENSE_STEPS % counts[-1] == 0
+    assert counts[0] == 1 < counts[1] < counts[2]
+    coarse = shapes(bar)
+    # What the fine bake shows is near what one of all steps shows.
+    bpy.ops.qc3d.bake_inbetweens(
+        from_key="Basis", to_key="Bent", count=DENSE_STEPS - 1, engine="delaunay", quality="draft"
+    )
+    dense = shapes(bar)
+    stride = DENSE_STEPS // counts[2]
+    kept = [coarse["Basis"]] + [coarse[f"{SLIDER} {step}/{counts[2]}"] for step in range(1, counts[2] + 1)]
+    for step in range(1, DENSE_STEPS):
+        before, part = step // stride, step % stride / stride
+        blend = kept[before] * (1.0 - part) + kept[min(before + 1, counts[2])] * part
+        assert np.linalg.norm(blend - dense[f"{SLIDER} {step}/{DENSE_STEPS}"], axis=1).max() <= 0.005 + 1e-5
+
+
+def test_a_straight_blend_is_enough(bar: bpy.types.Object, shapes: ReadShapes, shown: Callable[..., Any]) -> None:
+    bake(100.0)
+    assert [name for name in shapes(bar) if name.startswith(SLIDER)] == [f"{SLIDER} 1/1"]
+    seen = shown(bar, **{SLIDER: 0.5})
+    assert np.abs(seen - 0.5 * (shapes(bar)["Basis"] + shapes(bar)["Bent"])).max() < 1e-6
+
+
+def test_baked_again_with_the_same_tolerance(bar: bpy.types.Object) -> None:
+    bake(0.02)
+    before = steps(bar)
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+    assert steps(bar) == before
+    for point in bar.data.shape_keys.key_blocks["Bent"].points:
+        point.co.z *= 1.0 + 0.5 * max(point.co.x, 0.0)
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+    assert steps(bar) > 1
+    assert SLIDER in bar

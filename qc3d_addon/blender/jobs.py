@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -91,6 +93,7 @@ class Job:
         self.is_cancelled = False
         self._started = clock.monotonic()
         self._worker: Any = Worker(task, limits)
+        self._at_end = ExitStack()
 
     @property
     def seconds(self) -> float:
@@ -103,9 +106,14 @@ class Job:
             self.course.follow(self._worker.progress)
         return self._worker.poll()
 
+    def at_end(self, call: Callable[[], None]) -> None:
+        """Call this when the job ends, in whatever way: Blender drops a running operator without asking it."""
+        self._at_end.callback(call)
+
     def stop(self) -> None:
-        """End the child process and remove its files."""
-        self._worker.close()
+        """End the child process, remove its files, and do what was left for the end."""
+        with self._at_end:
+            self._worker.close()
 
 
 _current: Job | None = None

@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 
 from ..solver.errors import InputError
-from . import checks, heat_map, kept_measures, shape_keys, slider
+from . import checks, heat_map, kept_measures, live_scrub, shape_keys, slider
 from .operators.bake_inbetweens import QC3D_OT_rebake
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -17,6 +17,7 @@ from .operators.chains import (
     QC3D_OT_to_keyframes,
 )
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
+from .operators.live_scrub import QC3D_OT_live_scrub
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 from .records import Chain, Record
@@ -80,6 +81,8 @@ def _draw_chain(
         _draw_distortion(layout, obj, chain)
     buttons = layout.row(align=True)
     buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
+    is_on = live_scrub.is_on(obj, chain.slider)
+    buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
     header, more = layout.panel(f"QC3D_more_{chain.slider}", default_closed=True)
     header.label(text="More")
     if more is not None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import checks, jobs, presets
+from . import checks, jobs, presets, progress
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
 from .operators.cancel import QC3D_OT_cancel
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
@@ -76,8 +76,7 @@ def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.t
 
 
 def _draw_job(layout: bpy.types.UILayout, job: jobs.Job) -> None:
-    course = job.course
     column = layout.column()
     column.label(text=f"{job.label}, {job.seconds:.0f} s")
-    column.progress(text=course.stage, factor=course.fraction, type='BAR')
+    progress.draw_bar(column, job)
     column.operator(QC3D_OT_cancel.bl_idname, icon='CANCEL')

@@ -8,7 +8,7 @@ again, and what was read is compared before anything is written.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -19,7 +19,7 @@ from ..solver.easing import eased
 from ..solver.errors import InputError
 from . import checks, heat_map, kept_measures, mesh_data, names, shape_keys
 from .records import Chain, KeptMap, Record
-from .requests import BakeRequest, BakeResult
+from .requests import PREVIEW_STEPS, BakeRequest, BakeResult
 
 if TYPE_CHECKING:
     from ..solver.keypair import KeyPair
@@ -106,6 +106,18 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     usable = {ends: data for ends, data in kept.items() if data is not None}
     times = evenly_spaced(request.intervals - 1)
     return Plan(request, Task(pairs, request.keys, request.settings, times, usable), obj.session_uid, obj.name)
+
+
+def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
+    """Plan the frames of a baked chain as densely as a preview needs; nothing is written to the mesh for them.
+
+    Raises
+    ------
+    InputError
+        If the object or the keys cannot be used any more.
+    """
+    request = BakeRequest.again(chain.through, chain.request)
+    return plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0))
 
 
 def write_maps(plan: Plan, outcome: Outcome) -> None:

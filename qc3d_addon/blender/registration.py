@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import cli, compat, jobs, legend, panel_results, panels, preferences, presets, properties
+from . import cli, compat, jobs, legend, live_scrub, panel_results, panels, preferences, presets, properties
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -18,6 +18,7 @@ from .operators.chains import (
 )
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
+from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.prepare import QC3D_OT_prepare
 
 CLASSES = (
@@ -30,6 +31,7 @@ CLASSES = (
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
     QC3D_OT_select_worst,
+    QC3D_OT_live_scrub,
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
     QC3D_OT_absolute_keys,
@@ -53,6 +55,7 @@ def register() -> None:
     bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
     jobs.register()
     legend.register()
+    live_scrub.register()
     _commands.extend(compat.register_command("qc3d", cli.run_command))
 
 
@@ -60,6 +63,7 @@ def unregister() -> None:
     """Undo ``register`` in reverse order."""
     while _commands:
         compat.unregister_command(_commands.pop())
+    live_scrub.unregister()
     legend.unregister()
     jobs.unregister()
     del bpy.types.Object.qc3d

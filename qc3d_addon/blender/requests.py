@@ -13,6 +13,9 @@ from . import names
 
 # Frames of every two keys that a tolerance chooses from; it has many divisors.
 DENSE_STEPS = 48
+# Frames of every two keys that a preview is a spline through: it misses the others by less than 1e-5 of the size
+# (benchmarks/scrub.py).
+PREVIEW_STEPS = 24
 
 
 @dataclass(frozen=True)

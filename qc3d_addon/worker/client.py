@@ -126,6 +126,7 @@ class Worker:
         flags = 0
         if sys.platform == "win32":
             flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
+            flags |= subprocess.BELOW_NORMAL_PRIORITY_CLASS  # the window that the user works in comes first
         with open(self._errors, "wb") as stream:
             return subprocess.Popen(
                 [str(part) for part in command],

@@ -24,6 +24,8 @@ import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
+_NICE = 5  # the window that the user works in comes first
+
 
 def main(arguments: list[str]) -> None:
     package, folder, memory, libraries = Path(arguments[0]), Path(arguments[1]), int(arguments[2]), arguments[3:]
@@ -31,6 +33,8 @@ def main(arguments: list[str]) -> None:
     messages = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
     name = _load(package)
     errors = importlib.import_module(f"{name}.solver.errors")

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +15,11 @@ from qc3d_addon.worker.client import Limits
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user folder of the test's own."""
     monkeypatch.setattr(bpy.utils, "user_resource", lambda kind, path="", create=False: str(tmp_path / path))
     (tmp_path / "presets" / "qc3d").mkdir(parents=True)
-    yield tmp_path / "presets" / "qc3d"
+    return tmp_path / "presets" / "qc3d"
 
 
 def test_saved_and_taken_up_again(figure: bpy.types.Object, folder: Path) -> None:

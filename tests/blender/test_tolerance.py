@@ -41,10 +41,10 @@ def bar() -> bpy.types.Object:
     return obj
 
 
-def bake(tolerance: float, **choices: Any) -> None:
+def bake(tolerance: float) -> None:
     found = bpy.ops.qc3d.bake_inbetweens(
         from_key="Basis", to_key="Bent", use_tolerance=True, tolerance=tolerance, engine='delaunay',
-        quality='draft', **choices,
+        quality='draft',
     )  # fmt: skip
     assert found == {"FINISHED"}
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from .. import live_scrub
 from ..plans import Plan, plan_bake, write_bake
 from ..properties import BakeChoices, bake_request, fill_from_panel
 from ..requests import BakeRequest
@@ -34,6 +35,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
         return plan_bake(obj, bake_request(self))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        live_scrub.end()
         result = write_bake(plan, outcome)
         return [*result.notes, result.summary()]
 
@@ -56,5 +58,6 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         return plan_bake(obj, BakeRequest.again(chain.through, chain.request))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        live_scrub.end()
         result = write_bake(plan, outcome)
         return [*result.notes, result.summary()]

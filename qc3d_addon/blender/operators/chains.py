@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import absolute, keyframing, mirroring, point_cache, removal
+from .. import absolute, keyframing, live_scrub, mirroring, point_cache, removal
 from ..records import Chain, Record
 from .common import SLIDER, chosen_chain, poll_chains
 
@@ -28,6 +28,7 @@ class ChainWork:
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        live_scrub.end()
         obj = context.active_object
         try:
             slider = chosen_chain(obj, self.slider).slider

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 import bpy
 
 from ...solver.errors import QC3DError
-from .. import jobs, preferences
+from .. import jobs, preferences, progress
 from ..plans import Plan
 
 if TYPE_CHECKING:
@@ -47,8 +48,8 @@ class ChildWork:
             plan = self.plan(context)
             course = jobs.Course(plan.task.new_maps, len(plan.task.times) > 0)
 
-            def show(progress: Progress) -> None:
-                course.follow(progress)
+            def show(reached: Progress) -> None:
+                course.follow(reached)
                 manager.progress_update(course.fraction)
 
             manager.progress_begin(0.0, 1.0)
@@ -70,16 +71,16 @@ class ChildWork:
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._job.at_end(partial(_leave_window, timer))
         context.window_manager.modal_handler_add(self)
-        _redraw(context)
+        self._show(context)
         return {'RUNNING_MODAL'}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == 'ESC' and event.value == 'PRESS':
             jobs.cancel()
         if self._job.is_cancelled:
-            self._leave(context)
             self.report({'INFO'}, f"{self.bl_label} was cancelled; nothing was changed.")
             return {'CANCELLED'}
         if event.type != 'TIMER':
@@ -87,14 +88,17 @@ class ChildWork:
         try:
             outcome = self._job.poll()
             if outcome is None:
-                _show_status(context, self._job)
+                self._show(context)
                 return {'PASS_THROUGH'}
-            self._leave(context)
+            jobs.end()
             return self._finish(self._plan, outcome)
         except QC3DError as error:
-            self._leave(context)
+            jobs.end()
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
+        except BaseException:
+            jobs.end()  # else no other could ever start
+            raise
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
@@ -107,12 +111,11 @@ class ChildWork:
         self.report({'INFO'}, summary)
         return {'FINISHED'}
 
-    def _leave(self, context: bpy.types.Context) -> None:
-        context.window_manager.event_timer_remove(self._timer)
-        jobs.end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
-        _redraw(context)
+    def _show(self, context: bpy.types.Context) -> None:
+        shown = (self._job.course.stage, round(self._job.course.fraction, 2), int(self._job.seconds))
+        if shown != getattr(self, "_shown", None):  # drawing takes time from what the user does
+            self._shown = shown
+            progress.show(context)
 
 
 def raise_input(problem: str) -> None:
@@ -122,18 +125,6 @@ def raise_input(problem: str) -> None:
     raise InputError(problem)
 
 
-def _show_status(context: bpy.types.Context, job: jobs.Job) -> None:
-    if context.workspace is not None:
-        course = job.course
-        context.workspace.status_text_set(f"{job.label}: {course.stage}, {course.fraction:.0%}   (Esc: cancel)")
-    _redraw(context)
-
-
-def _redraw(context: bpy.types.Context) -> None:
-    """Let the sidebars of all 3D views be drawn again."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                for region in area.regions:
-                    if region.type == 'UI':
-                        region.tag_redraw()
+def _leave_window(timer: bpy.types.Timer) -> None:
+    bpy.context.window_manager.event_timer_remove(timer)
+    progress.clear()

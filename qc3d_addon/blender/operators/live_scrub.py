@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that switches live scrub on and off."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from .. import live_scrub
+from ..plans import Plan, plan_preview
+from .child_work import ChildWork
+from .common import SLIDER, chosen_chain, poll_chains
+
+if TYPE_CHECKING:
+    from ...solver.task import Outcome
+
+
+class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
+    """Show every moment of the motion while the slider is dragged, not only the baked ones; again to switch it off"""
+
+    bl_idname = "qc3d.live_scrub"
+    bl_label = "Live Scrub"
+    bl_options = set()  # noqa: RUF012 - Blender reads it from the class; there is nothing to undo
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self._switched_off(context) or super().invoke(context, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self._switched_off(context) or super().execute(context)
+
+    def plan(self, context: bpy.types.Context) -> Plan:
+        obj = context.active_object
+        chain = chosen_chain(obj, self.slider)
+        self.slider = chain.slider
+        return plan_preview(obj, chain)
+
+    def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        from ...solver.preview import PreviewCurve
+
+        obj = plan.find_object()
+        chain = chosen_chain(obj, self.slider)
+        live_scrub.begin(obj, chain, PreviewCurve(outcome.bake.frames, len(plan.request.keys) - 1))
+        return [f"Drag the slider '{chain.slider}': it shows every moment now."]
+
+    def _switched_off(self, context: bpy.types.Context) -> set[str] | None:
+        """Switch the preview off where it is on for this slider; None where it is not."""
+        is_same = live_scrub.is_on(context.active_object, self.slider)
+        live_scrub.end()
+        return {'FINISHED'} if is_same else None

@@ -95,7 +95,7 @@ def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: C
     worst = chain.result.get("worst")
     if worst:
         row = layout.row(align=True)
-        row.label(text=f"Worst stretch {worst['excess']:.1%} beyond the keys, at {worst['at']:.2f}")
+        row.label(text=f"Worst stretch +{worst['excess']:.1%} at {worst['at']:.2f}")
         row.operator(QC3D_OT_select_worst.bl_idname, text="", icon='RESTRICT_SELECT_OFF').slider = chain.slider
     if kept_measures.has(obj.data.shape_keys, chain.slider):
         state = heat_map.shown(obj)

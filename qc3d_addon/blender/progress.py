@@ -34,8 +34,10 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     layout, job = header.layout, jobs.current()
     if job is not None:
         layout.label(text=job.label, icon='SHAPEKEY_DATA')
-        draw_bar(layout, job)
-        layout.label(text="Cancel", icon='EVENT_ESC')
+        bar = layout.row()
+        bar.ui_units_x = 12
+        draw_bar(bar, job)
+        layout.label(text="  Cancel", icon='EVENT_ESC')
     layout.separator_spacer()
     layout.template_reports_banner()
     layout.separator_spacer()

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake from the panel's button, watched, cancelled, finished, undone, redone and made again."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from .harness import Window, is_alive, redraws
+
+BAKE, CANCEL, REBAKE = "qc3d.bake_inbetweens", "qc3d.cancel", "qc3d.rebake"
+OWN = ["Basis", "Bend 90", "Twist 120", "Bend and twist"]
+MADE = [f"Basis→Bend and twist {step}/4" for step in (1, 2, 3, 4)]
+BAR = np.array([71, 114, 179])  # the colour of Blender's progress bars
+
+
+def start(window: Window) -> int:
+    """Press the button; the process that does the work."""
+    window.push(BAKE)
+    return window.wait_for("child()")
+
+
+def bar_width(window: Window, path: Path) -> int:
+    """How many pixels of the progress bar, which is just above the button Cancel, are filled."""
+    _, y = window.find(CANCEL)
+    window.shoot(path)
+    rows = np.round(255 * matplotlib.image.imread(path)[y - 35 : y - 5, :, :3])
+    return int((np.abs(rows - BAR).max(axis=2) < 4).sum(axis=1).max())
+
+
+def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp_path: Path) -> None:
+    with redraws(window) as idle:
+        time.sleep(3.0)
+    with redraws(window) as busy:
+        child = start(window)
+        began = window.ask("len(counter.times)")
+        window.wait_for("job() is None")
+        ended = window.ask("len(counter.times)")
+    assert not is_alive(child)
+    rates = [len(gaps) / sum(gaps) for gaps in (idle, busy[began:ended])]
+    print(f"redraws a second: {rates[0]:.0f} without a bake, {rates[1]:.0f} during one; longest {max(busy):.2f} s")
+    # What a computer draws in a second is its own affair; drawing must not wait for the bake.
+    assert rates[1] > 0.2 * rates[0]
+
+    window.ask("arm().qc3d.quality = 'fine'")
+    start(window)
+    first = window.wait(lambda: bar_width(window, tmp_path / "first.png"), "a progress bar")
+    window.wait(lambda: bar_width(window, tmp_path / "second.png") > first, "a longer progress bar")
+    window.press("Escape")
+    window.wait_for("job() is None")
+
+
+@pytest.mark.parametrize("button", [False, True], ids=["Escape", "button"])
+def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
+    before = window.ask("state()")
+    child = start(window)
+    if button:
+        window.move(*window.find(CANCEL))
+    began = time.monotonic()
+    if button:
+        window.press_mouse()
+    else:
+        window.press("Escape")
+    window.wait_gone(child)
+    print(f"the child process was gone after {time.monotonic() - began:.2f} s")
+    window.wait_for("'Bake In-Betweens was cancelled; nothing was changed.' in reports()")
+    assert window.ask("state()") == before
+    assert window.ask("child()") is None
+    assert list(window.folder.glob("qc3d-*")) == []
+
+
+def test_a_bake_is_one_step_to_undo_and_can_be_made_again(window: Window) -> None:
+    window.ask("arm().qc3d.quality = 'draft'; remember('Draft')")
+    before = window.ask("state()")
+    start(window)
+    window.wait_for("job() is None")
+    baked = window.ask("state()")
+    assert baked[0] == OWN + MADE
+    window.press("ctrl+z")
+    window.wait_for(f"names() == {OWN}")
+    assert window.ask("state()") == before
+    window.press("ctrl+shift+z")
+    window.wait_for(f"names() == {OWN + MADE}")
+    assert window.ask("state()") == baked
+
+    window.ask("sculpt('Bend and twist'); remember('Sculpted')")
+    sculpted = window.ask("state()")
+    window.push(REBAKE)
+    window.wait_for("child()")
+    window.wait_for("job() is None")
+    again = window.ask("state()")
+    assert again[:2] == sculpted[:2]
+    assert again[3:] == sculpted[3:]
+    assert again[2] != sculpted[2]
+    assert window.ask("points('Bend and twist').tolist() == points('Basis→Bend and twist 4/4').tolist()")
+    window.press("ctrl+z")
+    window.wait_for(f"state() == {sculpted}")

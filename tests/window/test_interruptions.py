@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an animator may do while a bake is at work: nothing crashes, and a sentence says what became of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .conftest import open_arm
+from .harness import Window, is_alive
+
+BAKE = "qc3d.bake_inbetweens"
+CHANGED = "'Arm' was changed meanwhile; nothing was written."
+
+
+def start(window: Window, quality: str = "draft") -> int:
+    """Press the button; the process that does the work."""
+    window.ask(f"arm().qc3d.quality = '{quality}'")
+    window.push(BAKE)
+    return window.wait_for("child()")
+
+
+@pytest.fixture
+def own_window(root: Path, repository: Path) -> Iterator[Window]:
+    """A Blender that may end."""
+    with Window(root, (800, 600)) as window:
+        open_arm(window, repository)
+        yield window
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ("sculpt('Bend and twist')", CHANGED),
+        ("arm().data.shape_keys.key_blocks['Bend and twist'].name = 'Up'", CHANGED),
+        ("with inside('WINDOW'): bpy.ops.object.mode_set(mode='EDIT')", "'Arm' is being edited; go back to Object"),
+        ("bpy.data.objects.remove(arm())", "'Arm' was deleted meanwhile; nothing was written."),
+    ],
+    ids=["sculpted", "key renamed", "edited", "deleted"],
+)
+def test_what_was_changed_meanwhile_is_not_written_to(window: Window, change: str, sentence: str) -> None:
+    start(window)
+    window.ask(f"keys = list(bpy.data.meshes['Arm'].shape_keys.key_blocks)\n{change}\nremember('Changed')")
+    window.wait_for("job() is None")
+    window.wait_for(f"{sentence!r} in reports()")
+    assert window.ask("len(bpy.data.meshes['Arm'].shape_keys.key_blocks)") == 4
+    assert window.ask("list(bpy.data.meshes['Arm'].shape_keys.keys())") == []
+
+
+def test_a_renamed_object_and_another_active_one_are_no_obstacle(window: Window) -> None:
+    start(window)
+    window.ask("bpy.ops.mesh.primitive_cube_add(); bpy.data.objects['Arm'].name = 'Limb'; remember('Renamed')")
+    window.wait_for("job() is None")
+    assert len(window.ask("list(bpy.data.objects['Limb'].data.shape_keys.key_blocks.keys())")) == 8
+    assert window.ask("bpy.context.view_layer.objects.active.name") == "Cube"
+
+
+def test_an_undo_meanwhile_has_a_defined_outcome(window: Window) -> None:
+    window.ask("arm().location.x = 1.0; remember('Moved')")
+    start(window)
+    window.press("ctrl+z")
+    window.wait_for("arm().location.x == 0.0")
+    window.wait_for("job() is None")
+    assert len(window.ask("names()")) == 8
+
+
+def test_there_is_never_more_than_one_bake(window: Window) -> None:
+    child = start(window, "fine")
+    with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
+        window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('INVOKE_DEFAULT')")
+    with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
+        window.ask("bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Bend 90')")
+    assert window.ask("child()") == child
+    window.press("Escape")
+    window.wait_for("job() is None")
+
+
+def test_another_file_ends_the_bake(window: Window, repository: Path) -> None:
+    child = start(window, "fine")
+    before = window.ask("state()")
+    open_arm(window, repository)
+    assert not is_alive(child)
+    assert window.ask("job()") is None
+    assert window.ask("state()") == before
+    start(window)
+    window.wait_for("job() is None")
+    assert len(window.ask("names()")) == 8
+
+
+def test_disabling_the_addon_ends_the_bake(window: Window) -> None:
+    child = start(window, "fine")
+    before = window.ask("state()")
+    window.ask("bpy.ops.preferences.addon_disable(module=ADDON)")
+    assert not is_alive(child)
+    assert list(window.folder.glob("qc3d-*")) == []
+    window.ask("bpy.ops.preferences.addon_enable(module=ADDON)")
+    assert window.ask("state()") == before
+    window.open_sidebar()
+    start(window)
+    window.wait_for("job() is None")
+    assert len(window.ask("names()")) == 8
+
+
+@pytest.mark.parametrize("how", ["quits", "is killed"])
+def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
+    child = start(own_window, "fine")
+    if how == "quits":
+        with contextlib.suppress(ConnectionError):  # Blender may answer first
+            own_window.ask("bpy.ops.wm.quit_blender()")
+    else:
+        os.killpg(own_window.blender.pid, signal.SIGKILL)
+    status = own_window.blender.wait()
+    assert status == (0 if how == "quits" else -signal.SIGKILL), own_window.log
+    own_window.wait_gone(child)
+    if how == "quits":
+        assert list(own_window.folder.glob("qc3d-*")) == []

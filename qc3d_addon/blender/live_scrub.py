@@ -2,192 +2,200 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live scrub: while it is on, the slider shows every moment of the motion and not only the baked ones.
 
-A shape key, the only one that the object shows then, follows the slider. It is no part of the file: it goes away before
-the file is saved and comes back after, and whatever else ends the preview, undo included, gives the object back the
-active key and the display that it had.
+A shape key follows the slider. It adds to what the baked keys show, so it is on beside all other keys, and neither the
+active key nor the display changes. It is no part of the file: it goes away before the file is saved and comes back
+after. Its name is reserved: a key of that name is taken away wherever it turns up, by undo or in a recovered file.
 """
 
 from __future__ import annotations
 
-import json
+import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import bmesh
 import bpy
 from bpy.app.handlers import persistent
 
+from ..solver.errors import InputError
 from . import shape_keys
-from .mesh_data import set_key_coordinates
+from .mesh_data import key_coordinates, set_key_coordinates
 
 if TYPE_CHECKING:
     from ..solver.preview import PreviewCurve
+    from .plans import Plan
     from .records import Chain
 
 KEY = "QC3D Preview"
-_STATE = "qc3d_preview"  # property of the shape keys: what to give back
 
 
 @dataclass
 class _Scrub:
     """The preview that is on."""
 
-    object_id: int
-    slider: str
+    plan: Plan  # finds the object, and knows the keys that the curve was made from
+    chain: Chain
     curve: PreviewCurve
-    owner_id: int
     place: float | None = None  # where the slider was when the key was last set
+    was_edited: bool = False
 
 
 _scrub: _Scrub | None = None
-_suspended: _Scrub | None = None
+_suspended: _Scrub | None = None  # while the file is saved
 
 
 def is_on(obj: bpy.types.Object | None, slider: str = "") -> bool:
     """Whether the preview is on for an object, and for that slider where one is named."""
-    on_object = _scrub is not None and obj is not None and _scrub.object_id == obj.session_uid
-    return on_object and (not slider or _scrub.slider == slider)  # type: ignore[union-attr]
+    on_object = _scrub is not None and obj is not None and _scrub.plan.object_id == obj.session_uid
+    return on_object and (not slider or _scrub.chain.slider == slider)  # type: ignore[union-attr]
 
 
-def begin(obj: bpy.types.Object, chain: Chain, curve: PreviewCurve) -> None:
-    """Show the curve where the slider is, and follow the slider from now on."""
+def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
+    """Show the curve where the slider of a baked chain is, and follow the slider from now on.
+
+    Raises
+    ------
+    InputError
+        If the object of the plan is gone or was changed meanwhile; it is as it was.
+    """
+    obj = plan.find_object()
     end()
-    owner = shape_keys.slider_owner(obj, chain)
-    _show(obj, _Scrub(obj.session_uid, chain.slider, curve, owner.session_uid))
+    _show(obj, _Scrub(plan, chain, curve))
 
 
 def end() -> None:
-    """Take the preview away; nothing happens where there is none."""
-    global _scrub, _suspended
-    _scrub = _suspended = None
-    clean()
+    """Take the preview away, also one that undo or a recovered file brought back; else nothing happens."""
+    global _scrub
+    _scrub = None
+    for keys in list(bpy.data.shape_keys):
+        mesh = keys.user
+        if isinstance(mesh, bpy.types.Mesh) and mesh.library is None and _has_key(mesh):
+            _remove_key(mesh)
 
 
-def clean() -> None:
-    """Give every object that still has a preview what it had before, also one from an undone or crashed session."""
-    for keys in bpy.data.shape_keys:
-        if _STATE in keys:
-            for obj in bpy.data.objects:
-                if obj.type == 'MESH' and obj.data.shape_keys == keys:
-                    _give_back(obj)
-            keys.pop(_STATE, None)
+def _show_again(scrub: _Scrub) -> None:
+    """Show it where the object is there, is not being edited, and has the keys that the curve was made from."""
+    with contextlib.suppress(InputError):
+        _show(scrub.plan.find_object(), scrub)
 
 
 def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
     global _scrub
-    keys = obj.data.shape_keys
-    active = obj.active_shape_key
-    state = {"active": None if active is None else active.name, "only": obj.show_only_shape_key, "object": obj.name}
     key = obj.shape_key_add(name=KEY, from_mix=False)
-    key.value = 0.0
-    key.relative_key = keys.reference_key
-    state["key"] = key.name
-    keys[_STATE] = json.dumps(state)
-    obj.active_shape_key_index = keys.key_blocks.find(key.name)
-    obj.show_only_shape_key = True
+    key.relative_key = obj.data.shape_keys.reference_key
+    key.value = 1.0
+    scrub.place = None
     _scrub = scrub
-    _follow()
+    _follow(scrub)
 
 
-def _give_back(obj: bpy.types.Object) -> None:
-    keys = obj.data.shape_keys
-    try:
-        state = json.loads(keys[_STATE])
-        key = keys.key_blocks.get(state["key"])
-        if state["object"] == obj.name:
-            obj.show_only_shape_key = bool(state["only"])
-    except (TypeError, ValueError, KeyError):
-        return
-    wanted = obj.active_shape_key.name if obj.active_shape_key not in (None, key) else state["active"]
-    if key is not None:
-        obj.shape_key_remove(key)
-    obj.active_shape_key_index = max(keys.key_blocks.find(wanted or ""), 0)
-
-
-def _follow() -> None:
-    """Set the key to where the slider is, or end where the object is gone, edited or has lost the key."""
-    scrub = _scrub
-    if scrub is None:
-        return
-    obj = _find(scrub.object_id)
-    if obj is None or obj.type != 'MESH' or obj.data.shape_keys is None or _STATE not in obj.data.shape_keys:
+def _follow(scrub: _Scrub) -> None:
+    """Set the key to where the slider is, or end where the object is gone, was edited, or has lost key or slider."""
+    obj = scrub.plan.locate()
+    keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
+    key = None if keys is None else keys.key_blocks.get(KEY)
+    if key is None:
         end()
         return
-    if obj.mode != 'OBJECT':
-        return  # nothing may be removed now; the next update after it ends the preview
-    keys = obj.data.shape_keys
-    key = keys.key_blocks.get(json.loads(keys[_STATE])["key"])
-    owner = _find(scrub.owner_id)
-    is_whole = key is not None and owner is not None and scrub.slider in owner
-    if not is_whole or obj.active_shape_key != key or len(key.points) != scrub.curve.vertices:
+    if obj.data.is_editmode:
+        scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
+        return
+    owner = shape_keys.slider_owner(obj, scrub.chain)
+    is_whole = scrub.chain.slider in owner and len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
+    if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole:
         end()
         return
-    place = float(owner[scrub.slider])
-    if place != scrub.place:
+    place = float(owner[scrub.chain.slider])
+    if place != scrub.place and not key.mute:
         scrub.place = place
-        set_key_coordinates(key, scrub.curve.at(place))
+        basis = key_coordinates(obj, keys.reference_key.name)
+        set_key_coordinates(key, basis + scrub.curve.beyond_blend(place, scrub.chain.intervals))
         keys.update_tag()
 
 
-def _find(object_id: int) -> bpy.types.Object | None:
-    return next((obj for obj in bpy.data.objects if obj.session_uid == object_id), None)
+def _has_key(mesh: bpy.types.Mesh) -> bool:
+    in_layers = mesh.is_editmode and KEY in bmesh.from_edit_mesh(mesh).verts.layers.shape
+    return in_layers or KEY in mesh.shape_keys.key_blocks
+
+
+def _remove_key(mesh: bpy.types.Mesh) -> None:
+    obj = next((obj for obj in bpy.data.objects if obj.data == mesh), None)
+    is_unused = obj is None
+    if is_unused:  # only an object can remove a key
+        obj = bpy.data.objects.new(KEY, mesh)
+    if mesh.is_editmode:  # leaving Edit Mode would make the key again from its layer
+        layers = bmesh.from_edit_mesh(mesh).verts.layers.shape
+        if KEY in layers:
+            layers.remove(layers[KEY])
+    if KEY in mesh.shape_keys.key_blocks:
+        shape_keys.remove_key(obj, mesh.shape_keys.key_blocks[KEY])
+    if is_unused:
+        bpy.data.objects.remove(obj)
 
 
 @persistent
 def _on_update(*_: object) -> None:
     if _scrub is not None:
-        _follow()
+        _follow(_scrub)
 
 
 @persistent
-def _on_undo(*_: object) -> None:
-    """What was undone may have been made while a preview was on that is off now, or the other way round."""
-    obj = None if _scrub is None else _find(_scrub.object_id)
-    keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
-    if keys is None or _STATE not in keys:
-        end()
-    else:
-        _scrub.place = None  # type: ignore[union-attr]
-        _follow()
+def _after_undo(*_: object) -> None:
+    """What was undone may have been made with or without the preview: it stays on while the keys are the same."""
+    scrub = _scrub
+    end()
+    if scrub is not None:
+        _show_again(scrub)
 
 
 @persistent
 def _before_save(*_: object) -> None:
     global _suspended
-    suspended = _scrub
+    _suspended = _scrub
     end()
-    _suspended = suspended
 
 
 @persistent
 def _after_save(*_: object) -> None:
     global _suspended
-    suspended, _suspended = _suspended, None
-    obj = None if suspended is None else _find(suspended.object_id)
-    if obj is not None and obj.mode == 'OBJECT':
-        suspended.place = None  # type: ignore[union-attr]
-        _show(obj, suspended)  # type: ignore[arg-type]
+    scrub, _suspended = _suspended, None
+    if scrub is not None:
+        _show_again(scrub)
 
 
 @persistent
-def _before_load(*_: object) -> None:
-    global _scrub, _suspended
-    _scrub = _suspended = None
+def _before_render(*_: object) -> None:
+    _mute(True)
+
+
+@persistent
+def _after_render(*_: object) -> None:
+    _mute(False)
 
 
 @persistent
 def _after_load(*_: object) -> None:
-    clean()
+    end()
+
+
+def _mute(state: bool) -> None:
+    obj = None if _scrub is None else _scrub.plan.locate()
+    keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
+    if keys is not None and KEY in keys.key_blocks:
+        keys.key_blocks[KEY].mute = state
 
 
 _HANDLERS = {
     "depsgraph_update_post": _on_update,
     "frame_change_post": _on_update,
-    "undo_post": _on_undo,
-    "redo_post": _on_undo,
+    "undo_post": _after_undo,
+    "redo_post": _after_undo,
     "save_pre": _before_save,
     "save_post": _after_save,
     "save_post_fail": _after_save,
-    "load_pre": _before_load,
+    "render_init": _before_render,
+    "render_complete": _after_render,
+    "render_cancel": _after_render,
     "load_post": _after_load,
 }
 

@@ -48,6 +48,13 @@ class Plan:
     object_id: int
     object_name: str
 
+    def locate(self) -> bpy.types.Object | None:
+        """The object, whatever became of it; None where it was deleted."""
+        obj = bpy.data.objects.get(self.object_name)
+        if obj is not None and obj.session_uid == self.object_id:
+            return obj
+        return next((obj for obj in bpy.data.objects if obj.session_uid == self.object_id), None)
+
     def find_object(self) -> bpy.types.Object:
         """The object as it is now, where it can still be written to.
 
@@ -56,7 +63,7 @@ class Plan:
         InputError
             If it is gone, is being edited, or what was read from it has changed.
         """
-        obj = next((obj for obj in bpy.data.objects if obj.session_uid == self.object_id), None)
+        obj = self.locate()
         if obj is None:
             raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
         checks.require_object(obj)
@@ -109,7 +116,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
 
 
 def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
-    """Plan the frames of a baked chain as densely as a preview needs; nothing is written to the mesh for them.
+    """Plan the frames of a baked chain as densely as a preview needs, evenly spaced before any easing.
 
     Raises
     ------
@@ -117,7 +124,9 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
         If the object or the keys cannot be used any more.
     """
     request = BakeRequest.again(chain.through, chain.request)
-    return plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0))
+    even = replace(request.settings, easing="linear")
+    plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, settings=even))
+    return replace(plan, request=request)
 
 
 def write_maps(plan: Plan, outcome: Outcome) -> None:

@@ -180,6 +180,13 @@ def remove_keys(obj: bpy.types.Object, chain: Chain) -> None:
     obj.data.shape_keys.update_tag()
 
 
+def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
+    """Remove a shape key that no driver drives; the active key stays active where it is not this one."""
+    active = None if obj.active_shape_key == key else obj.active_shape_key
+    obj.shape_key_remove(key)
+    _activate(obj, active)
+
+
 def _new_key(obj: bpy.types.Object, name: str, undo: ExitStack) -> bpy.types.ShapeKey:
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .easing import Easing, eased
 from .tetmesh import Floats
 
 Singles = NDArray[np.float32]
@@ -15,15 +16,21 @@ Singles = NDArray[np.float32]
 class PreviewCurve:
     """A cubic spline in time through the frames of every pair, twice differentiable but at the keys.
 
+    It keeps two single-precision numbers for each coordinate of each frame.
+
     Parameters
     ----------
     frames : (pairs · d + 1, n, 3)
-        Evenly spaced frames from the first key of all to the last, d >= 3 steps for every two keys.
+        Evenly spaced frames, without easing, from the first key of all to the last, d >= 3 steps for every two keys.
     pairs
         Number of pairs of keys that the frames go through.
+    easing
+        How far along the frames the curve is at a time. Easing is left to the curve since the keys, where frames of
+        several pairs turn, must be among the frames.
     """
 
-    def __init__(self, frames: Floats, pairs: int = 1) -> None:
+    def __init__(self, frames: Floats, pairs: int = 1, easing: Easing = "linear") -> None:
+        self._easing = easing
         self._steps = (len(frames) - 1) // pairs
         operator = _slope_operator(self._steps)
         self._frames = frames.astype(np.float32)
@@ -40,7 +47,8 @@ class PreviewCurve:
 
     def at(self, time: float) -> Singles:
         """(n, 3) positions at ``time``, held to 0..1; the frames themselves, bit for bit, at their times."""
-        along = min(max(time, 0.0), 1.0) * (len(self._frames) - 1)
+        passed = eased(np.clip([time], 0.0, 1.0), self._easing).item()
+        along = passed * (len(self._frames) - 1)
         before = min(int(along), len(self._frames) - 2)
         part = np.float32(along - before)
         if part == 0.0 or part == 1.0:
@@ -54,6 +62,14 @@ class PreviewCurve:
         result += (part * rest * rest) * self._slopes[pair, step]
         result -= (part * part * rest) * self._slopes[pair, step + 1]
         return np.asarray(result)
+
+    def beyond_blend(self, time: float, steps: int) -> Singles:
+        """(n, 3) what the curve adds at ``time`` to the straight blend of its positions at ``steps`` even steps."""
+        along = min(max(time, 0.0), 1.0) * steps
+        before = min(int(along), steps - 1)
+        part = np.float32(along - before)
+        first, second = self.at(before / steps), self.at((before + 1) / steps)
+        return self.at(time) - ((np.float32(1.0) - part) * first + part * second)
 
 
 def _slope_operator(steps: int) -> Floats:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
+from qc3d_addon.solver.easing import Easing, eased
 from qc3d_addon.solver.preview import PreviewCurve
 
 RANDOM = np.random.default_rng(0)
@@ -53,3 +54,29 @@ def test_an_arc_is_met_to_the_fourth_order(steps: int) -> None:
     times = np.linspace(0.0, 1.0, 301)
     error = max(np.abs(curve.at(time) - arc(np.array([time]))[0]).max() for time in times)
     assert error < 0.2 * (0.5 * np.pi / steps) ** 4 + 2e-7
+
+
+@pytest.mark.parametrize("easing", ["ease-in", "ease-out", "ease-in-out"])
+def test_easing_is_when_and_not_where(easing: Easing) -> None:
+    frames = RANDOM.normal(size=(13, 7, 3))
+    times = np.linspace(0.0, 1.0, 31)
+    curve, eased_curve = PreviewCurve(frames, 2), PreviewCurve(frames, 2, easing)
+    for time, passed in zip(times, eased(times, easing), strict=True):
+        np.testing.assert_array_equal(eased_curve.at(time), curve.at(passed))
+
+
+@given(st.integers(1, 30), st.floats(-0.5, 1.5))
+def test_beyond_the_straight_blend(steps: int, time: float) -> None:
+    curve = PreviewCurve(np.random.default_rng(steps).normal(size=(9, 4, 3)))
+    nodes = np.linspace(0.0, 1.0, steps + 1)
+    hats = np.maximum(0.0, 1.0 - np.abs(np.clip(time, 0.0, 1.0) * steps - np.arange(steps + 1)))
+    blend = np.tensordot(hats, np.stack([curve.at(node) for node in nodes]), axes=1)
+    np.testing.assert_allclose(curve.beyond_blend(time, steps), curve.at(time) - blend, atol=5e-5)
+
+
+def test_nothing_is_beyond_the_steps_themselves() -> None:
+    curve = PreviewCurve(RANDOM.normal(size=(9, 4, 3)))
+    for step in range(8):
+        assert not curve.beyond_blend(step / 7, 7).any()
+    assert not curve.beyond_blend(1.0, 7).any()
+    assert curve.beyond_blend(0.5, 7).any()

@@ -45,9 +45,9 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         from ...solver.preview import PreviewCurve
 
-        obj = plan.find_object()
-        chain = chosen_chain(obj, self.slider)
-        live_scrub.begin(obj, chain, PreviewCurve(outcome.bake.frames, len(plan.request.keys) - 1))
+        chain = chosen_chain(plan.find_object(), self.slider)
+        pairs = len(plan.request.keys) - 1
+        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.settings.easing))
         return [f"Drag the slider '{chain.slider}': it shows every moment now."]
 
     def _switched_off(self, context: bpy.types.Context) -> set[str] | None:

@@ -112,6 +112,11 @@ class Embedding:
         """Points (k, 3) from cube units back to the keys' units, moved along the rigid motion up to ``time``."""
         return self.motion.apply((points - 0.5) / self.scale + self.centre, time)
 
+    def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
+        """Displacements (k, 3) at ``time`` from the keys' units to cube units: ``from_cube`` undone for differences."""
+        rotation = rotation_matrices(time * self.motion.turn[None])[0]
+        return np.asarray(self.scale * (vectors @ rotation))
+
     @cached_property
     def key0(self) -> Floats:
         """(n, 3): the first key in cube units."""

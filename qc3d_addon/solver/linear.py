@@ -8,6 +8,7 @@ from collections.abc import Generator
 
 import numpy as np
 
+from .colliders import Guard
 from .frame import Frame
 from .prepared import PreparedMap
 from .reconstruction import Reconstructor
@@ -54,8 +55,8 @@ class LinearFrames:
         self._limit = CrossingLimit(prepared.pair.faces, prepared.embedding.key0, prepared.embedding.key1)
         self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
 
-    def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
+    def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done. Nothing is kept off colliders."""
         made = []
         pair, still = self._prepared.pair, self._prepared.embedding.still
         for index, time in enumerate(times.tolist()):

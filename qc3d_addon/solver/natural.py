@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .branches import Turning, swing_beside
+from .colliders import Guard
 from .frame import Frame
 from .prepared import PreparedMap
 from .rates import Rates, hermite
@@ -22,6 +23,8 @@ from .uncrossing import CrossingLimit
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
+# How often the surface is solved again around what colliders push.
+_PUSHES = 4
 # How many times as strongly the surface is drawn to the volume's anchors at a crossing.
 _STRONGEST_ANCHOR = 1e5
 
@@ -106,14 +109,17 @@ class NaturalFrames:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
         return self._placed(self._shaped(self._surface, self._volume.at(time), time), time)
 
-    def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
+    def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1, kept off by ``guard``; yields the part that is done."""
         volumes, positions = [], []
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             volumes.append(self._volume.at(time))
             positions.append(self._shaped(self._surface, volumes[-1], time))
         positions, crossings = yield from self._uncrossed(times, volumes, positions)
+        if guard is not None:
+            positions = yield from self._kept_off(guard, times, volumes, positions)
+            crossings = [self._limit.excess(shape) for shape in positions]
         made = []
         for index, time in enumerate(times.tolist()):
             values = volumes[index]
@@ -162,6 +168,37 @@ class NaturalFrames:
                 break
             positions, excess = tried, remaining
         return positions, excess
+
+
+    def _kept_off(
+        self, guard: Guard, times: Floats, volumes: list[Floats], positions: list[Floats]
+    ) -> Generator[float, None, list[Floats]]:
+        """Push vertices off the colliders and let the surface around give way, until none is too near."""
+        embedding = self._prepared.embedding
+        moments = times.tolist()
+        reach = np.zeros(len(self.still))
+        for attempt in range(_PUSHES + 1):
+            yield attempt / (_PUSHES + 1)
+            nearby, pushed = [], []
+            for index, time in enumerate(moments):
+                place = self._placed(positions[index], time)
+                near, moved = guard.pushed(index, place, time)
+                nearby.append(near & ~self.still)
+                push = np.where(nearby[-1][:, None], embedding.vectors_to_cube(moved - place, time), 0.0)
+                pushed.append(positions[index] + push)
+            if not any(near.any() for near in nearby):
+                return positions
+            # The last push stands as it is; so does the only one where extra turns come on top of the surface's path.
+            if attempt == _PUSHES or self._spins:
+                return pushed
+            for near in nearby:
+                reach = np.maximum(reach, self._limit.faded(near))
+            surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
+            positions = [
+                surface.positions(time, np.where(reach[:, None] > 0.0, push, self._anchor(values, time)))
+                for time, values, push in zip(moments, volumes, pushed, strict=True)
+            ]
+        return positions
 
 
 def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:

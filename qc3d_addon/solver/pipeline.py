@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chain import join
+from .colliders import Collider, Guard, Obstacle
 from .continuation import follow_path
 from .easing import eased
 from .embedding import Embedding
@@ -166,7 +167,9 @@ def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> S
     return chain_inbetweens([prepared], times, settings)
 
 
-def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings: Settings) -> Steps[Bake]:
+def chain_inbetweens(
+    prepared: Sequence[PreparedMap], times: ArrayLike, settings: Settings, collider: Collider | None = None
+) -> Steps[Bake]:
     """Frames through several keys in a row; the keys themselves, bit for bit, where the time is theirs.
 
     Parameters
@@ -177,6 +180,8 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         0 is the first key of all, 1 the last; every pair takes the same time before ``settings.easing``.
     settings : Settings
         In mode ``natural`` velocities are continuous at the inner keys; ``linear``, as published, turns corners there.
+    collider : Collider, optional
+        What the frames must not touch, at each key of the chain. Mode ``linear`` does not look at it.
 
     Raises
     ------
@@ -193,6 +198,10 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         if not np.array_equal(left.pair.key1, right.pair.key0):
             raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
     seconds = _summed(part.seconds for part in prepared)
+    obstacle = None
+    if collider is not None:
+        with _timed(seconds, "colliders"):
+            obstacle = yield from _followed(collider, wanted, settings)
     segments, local = _split(eased(wanted, settings.easing), len(prepared))
     yield Progress("factor", 0.0)
     with _timed(seconds, "factor"):
@@ -205,7 +214,8 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         for number, maker in enumerate(makers):
             members = np.flatnonzero(segments == number)
             share = (number, len(makers))
-            produced = yield from _staged("frames", maker.frames(local[members]), share)
+            guard = None if obstacle is None else Guard(obstacle, prepared[number].pair, number, members)
+            produced = yield from _staged("frames", maker.frames(local[members], guard), share)
             made.update(zip(members.tolist(), produced, strict=True))
             for index, frame in zip(members, produced, strict=True):
                 frames[index] = frame.positions
@@ -217,6 +227,8 @@ def chain_inbetweens(prepared: Sequence[PreparedMap], times: ArrayLike, settings
         measures, worst = measure(prepared, segments, frames, [frame.values for frame in ordered])
     notes = [note for part in prepared for note in part.notes] + [note for maker in makers for note in maker.notes]
     report = bake_report(prepared, settings, wanted, ordered, notes)
+    if obstacle is not None:
+        report |= obstacle.report(frames, prepared[0].pair.faces, report["notes"])
     report |= {"worst_stretch": worst, "key_error": key_error, "seconds": seconds}
     return Bake(wanted, frames, report, measures)
 
@@ -226,8 +238,19 @@ class _FrameMaker(Protocol):
 
     notes: tuple[str, ...]
 
-    def frames(self, times: Floats) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done."""
+    def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1, kept off by ``guard``; yields the part that is done."""
+
+
+def _followed(collider: Collider, times: Floats, settings: Settings) -> Steps[Obstacle]:
+    """The collider at the times of the frames: where it is, or, where it moves, on its own natural way."""
+    if not collider.moves:
+        return Obstacle(collider, np.broadcast_to(collider.shapes[0], (len(times), *collider.shapes[0].shape)))
+    prepared = []
+    for pair in collider.pairs():
+        prepared.append((yield from prepare(pair, settings)))
+    bake = yield from chain_inbetweens(prepared, times, settings)
+    return Obstacle(collider, bake.frames)
 
 
 def _makers(prepared: Sequence[PreparedMap], settings: Settings) -> Generator[float, None, Sequence[_FrameMaker]]:

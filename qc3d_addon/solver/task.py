@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .colliders import Collider
 from .errors import naming_pair
 from .keypair import KeyPair
 from .pipeline import Bake, Steps, chain_inbetweens, prepare
@@ -36,6 +37,8 @@ class Task:
         Times of the frames, 0 the first key and 1 the last; empty where only the maps are wanted.
     kept : dict
         Stored maps, by the names of their keys, that need not be made again.
+    collider : Collider, optional
+        What the frames must not touch, at each of the keys ``through``.
     """
 
     pairs: dict[Ends, KeyPair]
@@ -43,6 +46,7 @@ class Task:
     settings: Settings
     times: Floats = field(default_factory=lambda: np.empty(0))
     kept: dict[Ends, bytes] = field(default_factory=dict)
+    collider: Collider | None = None
 
     @classmethod
     def of_keys(
@@ -113,6 +117,6 @@ def carry_out(task: Task) -> Steps[Outcome]:
     bake = None
     if len(task.times):
         bake = yield from chain_inbetweens(
-            [prepared[ends] for ends in pairwise(task.through)], task.times, task.settings
+            [prepared[ends] for ends in pairwise(task.through)], task.times, task.settings, task.collider
         )
     return Outcome(maps, bake)

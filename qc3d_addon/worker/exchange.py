@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..solver.colliders import Collider
 from ..solver.keypair import KeyPair
 from ..solver.pipeline import Bake
 from ..solver.settings import Settings
@@ -26,6 +27,8 @@ def write_task(folder: Path, task: Task) -> None:
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
+    if task.collider is not None:
+        np.savez(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
     _write_json(
         folder / _TASK, {"ends": list(task.pairs), "through": task.through, "settings": asdict(task.settings)}
     )
@@ -42,7 +45,11 @@ def read_task(folder: Path) -> Task:
         if path.exists():
             kept[first, second] = path.read_bytes()
     times = np.load(folder / "times.npy", allow_pickle=False)
-    return Task(pairs, tuple(header["through"]), Settings(**header["settings"]), times, kept)
+    collider = None
+    if (folder / "collider.npz").exists():
+        with np.load(folder / "collider.npz", allow_pickle=False) as stored:
+            collider = Collider(stored["shapes"], stored["faces"])
+    return Task(pairs, tuple(header["through"]), Settings(**header["settings"]), times, kept, collider)
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:

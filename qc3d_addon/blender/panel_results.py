@@ -29,12 +29,13 @@ _MORE = (
     (QC3D_OT_export_alembic, 'EXPORT'),
     (QC3D_OT_remove, 'TRASH'),
 )
+_PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
 
 
 class QC3D_PT_results(bpy.types.Panel):
     """The sliders of the active object's in-betweens, the newest first."""
 
-    bl_label = "In-Betweens"
+    bl_label = "Baked In-Betweens"
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
     bl_category = "QC3D"
@@ -65,24 +66,26 @@ def _draw_chain(
         layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
     else:
         layout.label(text=f"{chain.slider}: the slider was deleted", icon='ERROR')
-    result = chain.result
-    if result:
-        facts = layout.column(align=True)
-        facts.scale_y = 0.8
-        facts.label(text=f"{result['count']} in-betweens in {result['seconds']:.1f} s, engine {result['engine']}")
-        clean = not result["folds"] and not result["crossings"]
-        facts.label(
-            text=f"Folds {result['folds']}, new crossings {result['crossings']}",
-            icon='CHECKMARK' if clean else 'ERROR',
-        )
-        facts.label(text=f"Residual {result['residual']:.1e} of the size")
-        for note in result["notes"]:
-            draw_sentence(context, layout, note)
-        _draw_distortion(layout, obj, chain)
     buttons = layout.row(align=True)
     buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
     is_on = live_scrub.is_on(obj, chain.slider)
     buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
+    result = chain.result
+    if result:
+        facts = layout.column(align=True)
+        facts.scale_y = 0.8
+        facts.label(text=f"{result['count']} in-betweens in {result['seconds']:.1f} s")
+        looked_for = {name: what for name, what in _PROBLEMS.items() if result.get(name) is not None}
+        problems = [f"{result[name]} {what}" for name, what in looked_for.items() if result[name]]
+        facts.label(
+            text=", ".join(problems) or f"No {', no '.join(looked_for.values())}",
+            icon='ERROR' if problems else 'CHECKMARK',
+        )
+        facts.label(text=f"Fitted within {result['residual']:.2%} of the size")
+        facts.label(text=f"Engine {result['engine']}")
+        _draw_distortion(layout, obj, chain)
+        for note in result["notes"]:
+            draw_sentence(context, layout, note)
     header, more = layout.panel(f"QC3D_more_{chain.slider}", default_closed=True)
     header.label(text="More")
     if more is not None:

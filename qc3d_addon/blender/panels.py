@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..worker import engines
 from . import checks, jobs, presets, progress
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
 from .operators.cancel import QC3D_OT_cancel
@@ -13,6 +14,9 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_ke
 from .operators.prepare import QC3D_OT_prepare
 from .panel_texts import draw_sentence
 from .properties import ObjectSettings, key_names
+
+# Else Blender asks the operators whether they can run as if the mouse were over the 3D view, not over this panel.
+IN_THE_SIDEBAR = 'INVOKE_DEFAULT'
 
 
 class QC3D_PT_inbetweens(bpy.types.Panel):
@@ -36,11 +40,16 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         if job is not None:
             _draw_job(layout, job)
             return
-        buttons = layout.column()
-        buttons.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
-        buttons.operator(QC3D_OT_prepare.bl_idname)
+        button = layout.column()
+        button.operator_context = IN_THE_SIDEBAR
+        button.scale_y = 1.4
+        button.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
         if problem is not None:
             draw_sentence(context, layout, problem)
+            return
+        notice = engines.engine_notice() if obj.qc3d.engine != 'delaunay' else None
+        if notice is not None and not checks.has_chains(obj.data.shape_keys):  # else it is said with what was baked
+            draw_sentence(context, layout, notice)
 
 
 def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -50,11 +59,13 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     amount = layout.column(align=True)
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
     amount.prop(settings, "use_tolerance")
-    layout.prop(settings, "mode")
-    layout.row().prop(settings, "quality", expand=True)
-    layout.prop(settings, "use_keyframes")
+    look = layout.column()
+    look.prop(settings, "mode")
+    look.row().prop(settings, "quality", expand=True)
+    look.prop_search(settings, "colliders", bpy.data, "collections")
+    frames = layout.column(align=True)
+    frames.prop(settings, "use_keyframes")
     if settings.use_keyframes:
-        frames = layout.column(align=True)
         frames.prop(settings, "frame_start")
         frames.prop(settings, "frame_end")
     header, advanced = layout.panel("QC3D_advanced", default_closed=True)
@@ -62,17 +73,20 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if advanced is not None:
         for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
             advanced.prop(settings, name)
+        advanced.operator_context = IN_THE_SIDEBAR
+        advanced.operator(QC3D_OT_prepare.bl_idname)
 
 
 def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.types.Key) -> None:
     """A row for each key, in the order in which they are gone through."""
-    layout.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    column = layout.column()
+    column.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
     for index, inner in enumerate(settings.via):
-        row = layout.row(align=True)
+        row = column.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
         row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
-    layout.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
-    layout.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
+    column.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    column.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
 
 
 def _draw_job(layout: bpy.types.UILayout, job: jobs.Job) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..worker import engines
 from . import cli, compat, jobs, legend, live_scrub, panel_results, panels, preferences, presets, properties
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from .operators.cancel import QC3D_OT_cancel
@@ -66,6 +67,7 @@ def unregister() -> None:
     live_scrub.unregister()
     legend.unregister()
     jobs.unregister()
+    engines.forget()
     del bpy.types.Object.qc3d
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -174,6 +174,17 @@ class Window:
         """Press a button of the mouse where it is: 1 to 3, or 4 and 5 to turn its wheel up and down."""
         self._xdotool("click", "--repeat", str(times), "--delay", "20", str(button))
 
+    def drag(self, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """Drag with the left button from one place to another, in steps as a hand does."""
+        self.move(*start)
+        time.sleep(0.3)
+        self._xdotool("mousedown", "1")
+        for step in range(1, 11):
+            self.move(*(round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True)))
+            time.sleep(0.03)
+        self._xdotool("mouseup", "1")
+        time.sleep(0.3)
+
     def press(self, *keys: str) -> None:
         """Press keys one after the other, named as xdotool does, as "ctrl+z" or "Escape"."""
         self._xdotool("key", *keys)

@@ -55,6 +55,18 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
     window.wait_for("job() is None")
 
 
+def test_the_button_cannot_be_pressed_before_the_keys_are_chosen(window: Window) -> None:
+    window.ask("arm().qc3d.to_key = ''; remember('No key')")
+    window.push(BAKE)
+    time.sleep(1.0)  # nothing is to happen, for which there is no sign
+    assert window.ask("job()") is None
+    assert "Choose the second key" not in window.ask("reports()")  # an error, where it could be pressed
+    window.ask(f"arm().qc3d.to_key = {OWN[3]!r}")
+    start(window)
+    window.press("Escape")
+    window.wait_for("job() is None")
+
+
 @pytest.mark.parametrize("button", [False, True], ids=["Escape", "button"])
 def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
     before = window.ask("state()")

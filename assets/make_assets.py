@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the demo files from Blender's own primitives, the same every time: python assets/make_assets.py [FOLDER].
 
-``limb.blend`` is a mannequin's arm on a chest that stays still; ``suzanne.blend`` is Suzanne with expressions. The
-shipped files were saved by Blender 4.5, so that 4.5 and everything after it opens them.
+``limb.blend`` is a mannequin's arm on a chest that stays still; ``suzanne.blend`` is Suzanne with expressions;
+``lid.blend`` is a lid that closes over an eyeball, which is in the collection "Eyeball". The shipped files were saved by Blender 4.5, so that 4.5 and everything after it opens them.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Deformation = Callable[[Floats], Floats]
 
 
 def main(folder: Path) -> None:
-    """Write both files into ``folder``."""
-    for name, build in (("limb", build_limb), ("suzanne", build_suzanne)):
+    """Write the files into ``folder``."""
+    for name, build in (("limb", build_limb), ("suzanne", build_suzanne), ("lid", build_lid)):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         build()
         path = folder / f"{name}.blend"
@@ -96,6 +96,50 @@ def build_suzanne() -> None:
             "Surprise": lambda points: brows(ears(jaw(points))),
         },
     )
+
+
+def build_lid() -> None:
+    """An eyeball of radius 1 with a strong cornea towards -y, and an upper lid 2 % of the radius above it."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=1.0)
+    eyeball = bpy.context.object
+    eyeball.name = eyeball.data.name = "Eyeball"
+    rays = np.empty(3 * len(eyeball.data.vertices), dtype=np.float32)
+    eyeball.data.vertices.foreach_get("co", rays)
+    eyeball.data.vertices.foreach_set("co", _bulging(rays.reshape(-1, 3).astype(np.float64)).astype(np.float32).ravel())
+    eyeball.data.polygons.foreach_set("use_smooth", [True] * len(eyeball.data.polygons))
+    collection = bpy.data.collections.new("Eyeball")
+    bpy.context.scene.collection.children.link(collection)
+    for other in eyeball.users_collection:
+        other.objects.unlink(eyeball)
+    collection.objects.link(eyeball)
+
+    rows, columns = 24, 41
+    numbers = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=-1).reshape(-1, 4)
+    mesh = bpy.data.meshes.new("Lid")
+    mesh.from_pydata(_lid(38.0, rows, columns).tolist(), [], quads.tolist())
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    lid = bpy.data.objects.new("Lid", mesh)
+    bpy.context.scene.collection.objects.link(lid)
+    bpy.context.view_layer.objects.active = lid
+    _add_shapes(lid, {"Closed": lambda points: _lid(-15.0, rows, columns)})
+
+
+def _lid(margin: float, rows: int, columns: int) -> Floats:
+    """A lid from its crease, 70 degrees above the middle, to its margin; both run together at the corners."""
+    down, across = np.linspace(0.0, 1.0, rows)[:, None], np.linspace(-1.0, 1.0, columns)[None]
+    latitude = np.radians((70.0 + (margin - 70.0) * down) * (1.0 - across**2))
+    longitude = np.radians(62.0) * (across + 0.0 * down)
+    flat = np.cos(latitude)
+    rays = np.stack([flat * np.sin(longitude), -flat * np.cos(longitude), np.sin(latitude)], axis=-1).reshape(-1, 3)
+    return _bulging(rays) + 0.02 * rays
+
+
+def _bulging(rays: Floats) -> Floats:
+    """Points of the eyeball on rays of length 1: a ball, a quarter longer in the middle of the cornea."""
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    angle = np.degrees(np.arccos(np.clip(-rays[:, 1], -1.0, 1.0)))
+    return np.asarray(rays * (1.0 + 0.25 * np.maximum(1.0 - (angle / 30.0) ** 2, 0.0) ** 2)[:, None])
 
 
 def _ball(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> bpy.types.Object:

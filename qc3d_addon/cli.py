@@ -79,7 +79,13 @@ def _bake(arguments: argparse.Namespace) -> None:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     _require_distinct_files(arguments.file, arguments.report)
     _require_distinct_files(arguments.output, arguments.report)
-    request = BakeRequest(_key_names(arguments), arguments.frames, settings_of(arguments), arguments.keyframes)
+    request = BakeRequest(
+        _key_names(arguments),
+        arguments.frames,
+        settings_of(arguments),
+        arguments.keyframes,
+        colliders=arguments.colliders,
+    )
     with StageBars() as bars:
         result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)
     _print_notes(result.notes)
@@ -124,6 +130,9 @@ def _parser() -> argparse.ArgumentParser:
         nargs=2,
         metavar=("FIRST", "LAST"),
         help="animate the slider over these frames",
+    )
+    bake.add_argument(
+        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
     )
     add_settings(bake)
     bake.set_defaults(run=_bake)

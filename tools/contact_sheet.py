@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.figures.shading import VIEWS
+from qc3d_addon.figures.shading import VIEWS, Floats, Ints
 from qc3d_addon.figures.sheets import Row, save_sheet, straight_blend
 
 
@@ -28,6 +28,8 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--from", dest="first", help="in a .blend: the first key")
     parser.add_argument("--via", action="append", default=[], help="in a .blend: a key between them; once for each")
     parser.add_argument("--to", dest="last", help="in a .blend: the last key")
+    parser.add_argument("--scenery", metavar="NAME", help="in a .blend: a mesh to draw with it, where it stands")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="draw only every so many frames")
     parser.add_argument("--straight", action="store_true", help="add the straight blend of the keys as the first row")
     parser.add_argument("--view", choices=["auto", *VIEWS], default="auto")
     parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
@@ -36,8 +38,12 @@ def main(argv: list[str] | None = None) -> None:
     arguments = parser.parse_args(argv)
 
     rows = [_read(row, arguments) for row in arguments.rows]
+    rows = [row._replace(times=row.times[:: arguments.every], frames=row.frames[:: arguments.every]) for row in rows]
     if arguments.straight:
         rows.insert(0, straight_blend(rows[0]))
+    if arguments.scenery is not None:
+        scenery = _read_scenery(arguments.scenery)
+        rows = [row.with_scenery(*scenery) for row in rows]
     if arguments.up == "y":
         rows = [row._replace(frames=row.frames[..., [0, 2, 1]] * (1.0, -1.0, 1.0)) for row in rows]
     save_sheet(rows, arguments.view, arguments.height, arguments.output)
@@ -72,6 +78,19 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     steps = sorted(keys)
     frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
     return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)
+
+
+def _read_scenery(name: str) -> tuple[Floats, Ints]:
+    """Positions and triangles of a mesh in the file that was read last, in the scene's coordinates."""
+    import bpy
+
+    from qc3d_addon.blender.mesh_data import triangles
+
+    if name not in bpy.data.objects:
+        raise SystemExit(f"There is no object {name!r}.")
+    obj = bpy.data.objects[name]
+    points = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
+    return points, triangles(obj.data).astype(np.int64)
 
 
 if __name__ == "__main__":

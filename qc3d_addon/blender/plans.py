@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..solver.easing import eased
 from ..solver.errors import InputError
-from . import checks, heat_map, kept_measures, mesh_data, names, shape_keys
+from . import checks, colliders, heat_map, kept_measures, mesh_data, names, shape_keys
 from .records import Chain, KeptMap, Record
 from .requests import PREVIEW_STEPS, BakeRequest, BakeResult
 
@@ -112,7 +112,9 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     kept = {ends: record.kept_map(keys, _kept(ends, pair, request)) for ends, pair in pairs.items()}
     usable = {ends: data for ends, data in kept.items() if data is not None}
     times = evenly_spaced(request.intervals - 1)
-    return Plan(request, Task(pairs, request.keys, request.settings, times, usable), obj.session_uid, obj.name)
+    collider = colliders.read_colliders(obj, request.colliders, request.keys)
+    task = Task(pairs, request.keys, request.settings, times, usable, collider)
+    return Plan(request, task, obj.session_uid, obj.name)
 
 
 def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
@@ -234,10 +236,15 @@ def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[
         "seconds": sum(report["seconds"].values()),
         "folds": sum(report["folds"]["frames"][step] for step in chosen),
         "crossings": sum(report["crossings"][step] for step in chosen),
+        "collider_crossings": _summed(report.get("collider_crossings"), chosen),
         "worst": {"excess": worst["excess"], "at": float(times[worst["frame"]]), "vertex": worst["vertex"]},
         "residual": report["residual"]["rms"],
         "notes": report["notes"],
     }
+
+
+def _summed(counts: list[int] | None, chosen: NDArray[np.int64]) -> int | None:
+    return None if counts is None else sum(counts[step] for step in chosen)
 
 
 def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[dict[int, str], list[str]]:

@@ -124,6 +124,11 @@ class BakeChoices(MapChoices):
         unit='LENGTH',
         options={'SKIP_SAVE'},
     )
+    colliders: StringProperty(
+        name="Keep Off",
+        description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
+        options={'SKIP_SAVE'},
+    )
     mode: _choice("mode", "How the map between the keys is interpolated")
     easing: _choice("easing", "How the speed from the first key to the last changes")
     use_keyframes: BoolProperty(
@@ -183,4 +188,5 @@ def bake_request(choices: BakeChoices) -> BakeRequest:
         settings=solver_settings(choices),
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
         tolerance=choices.tolerance if choices.use_tolerance else 0.0,
+        colliders=choices.colliders,
     )

@@ -35,6 +35,8 @@ class BakeRequest:
     tolerance
         Where positive, as few in-betweens as show every moment within this distance, in the object's units; ``count``
         is then not looked at.
+    colliders
+        Name of a collection with objects that the in-betweens must not touch, or empty.
     """
 
     keys: tuple[str, ...]
@@ -42,6 +44,7 @@ class BakeRequest:
     settings: Settings = field(default_factory=Settings)
     keyframes: tuple[int, int] | None = None
     tolerance: float = 0.0
+    colliders: str = ""
 
     def __post_init__(self) -> None:
         if len(self.keys) < 2:
@@ -64,7 +67,12 @@ class BakeRequest:
 
     def remembered(self) -> dict[str, Any]:
         """What another bake of the same keys needs to know, as plain values."""
-        return {"count": self.count, "tolerance": self.tolerance, "settings": asdict(self.settings)}
+        return {
+            "count": self.count,
+            "tolerance": self.tolerance,
+            "settings": asdict(self.settings),
+            "colliders": self.colliders,
+        }
 
     @classmethod
     def again(cls, keys: tuple[str, ...], remembered: dict[str, Any]) -> BakeRequest:
@@ -77,7 +85,8 @@ class BakeRequest:
         """
         try:
             settings = Settings(**remembered["settings"])
-            return cls(keys, int(remembered["count"]), settings, None, float(remembered["tolerance"]))
+            colliders = str(remembered.get("colliders", ""))
+            return cls(keys, int(remembered["count"]), settings, None, float(remembered["tolerance"]), colliders)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
 

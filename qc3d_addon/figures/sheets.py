@@ -18,16 +18,30 @@ from matplotlib import pyplot
 BACKGROUND = (0.93, 0.93, 0.93)
 KEY_COLOUR = (0.55, 0.68, 0.86)
 INBETWEEN_COLOUR = (0.93, 0.75, 0.58)
+SCENERY_COLOUR = (0.97, 0.97, 0.97)
 _DOTS_PER_INCH = 100
 
 
 class Row(NamedTuple):
-    """Shapes (k, n, 3) of one mesh at ``times`` (k,), the first and the last of them the keys."""
+    """Shapes (k, n, 3) of one mesh at ``times`` (k,), the first and the last of them the keys.
+
+    The last ``scenery`` of the triangles are not the mesh's own and painted grey.
+    """
 
     label: str
     faces: Ints
     times: Floats
     frames: Floats
+    scenery: int = 0
+
+    def with_scenery(self, points: Floats, faces: Ints) -> Row:
+        """The row with a mesh that stays where it is, (c, 3) and (f, 3)."""
+        still = np.broadcast_to(points, (len(self.frames), *points.shape))
+        return self._replace(
+            faces=np.concatenate([self.faces, faces + self.frames.shape[1]]),
+            frames=np.concatenate([self.frames, still], axis=1),
+            scenery=self.scenery + len(faces),
+        )
 
 
 def straight_blend(row: Row) -> Row:
@@ -66,4 +80,6 @@ def save_sheet(rows: list[Row], view: str, height: int, path: Path) -> None:
 
 def _picture(row: Row, index: int, camera: Camera, height: int) -> Floats:
     colour = KEY_COLOUR if index in (0, len(row.times) - 1) else INBETWEEN_COLOUR
-    return draw(row.frames[index], row.faces, camera, height, colour, BACKGROUND)
+    paint = np.tile(colour, (len(row.faces), 1))
+    paint[len(row.faces) - row.scenery :] = SCENERY_COLOUR
+    return draw(row.frames[index], row.faces, camera, height, paint, BACKGROUND)

@@ -123,7 +123,7 @@ def test_mode_linear_does_not_look_at_colliders() -> None:
 def test_the_guard_keeps_what_the_keys_keep_but_no_more_than_needed() -> None:
     eye, eye_faces = icosphere(3)
     obstacle = Obstacle(Collider.checked(np.stack([eye - 0.5] * 2), eye_faces), np.stack([eye - 0.5] * 3))
-    points = np.array([[0.0, 0.0, 0.4], [0.0, 0.4, 0.0], [0.5, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    points = np.array([[0.0, 0.0, 0.4], [0.0, 0.4, 0.0], [0.9, 0.0, 0.0], [1.0, 1.0, 1.0]])
     pair = KeyPair.checked(points, points * 1.1, [[0, 1, 2]])
     guard = Guard(obstacle, pair, 0, np.array([0, 1, 2]))
     near, moved = guard.pushed(1, points * 0.7, 0.5)

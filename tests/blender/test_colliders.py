@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colliders of a bake: which objects, where they are, and what is said where there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from qc3d_addon.blender import plans
+from qc3d_addon.blender.colliders import read_colliders
+from qc3d_addon.blender.records import Record
+from qc3d_addon.solver.colliders import Collider
+
+THROUGH = ("Basis", "Lean")
+State = Callable[[], dict[str, Any]]
+
+
+@pytest.fixture
+def ball(figure: bpy.types.Object) -> bpy.types.Object:
+    """A small sphere in the collection "Off", in the way of the figure's Lean."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.3, location=(2.0, 0.0, 1.0))
+    obj = bpy.context.active_object
+    obj.name = "Ball"
+    collection = bpy.data.collections.new("Off")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = figure
+    bpy.context.view_layer.update()
+    return obj
+
+
+def read(figure: bpy.types.Object, name: str = "Off") -> Collider:
+    found = read_colliders(figure, name, THROUGH)
+    assert found is not None
+    return found
+
+
+def volume(points: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = points[faces.T]
+    return float((a * np.cross(b, c)).sum() / 6.0)
+
+
+def test_seen_from_the_object(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+    figure.location, figure.scale = (1.0, 0.0, 0.0), (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    found = read(figure)
+    assert not found.moves
+    np.testing.assert_allclose(found.shapes[0].mean(axis=0), [0.5, 0.0, 0.5], atol=1e-5)
+    np.testing.assert_allclose(np.ptp(found.shapes[0], axis=0), 0.3, rtol=0.1)
+    assert volume(found.shapes[0], found.faces) > 0.0
+
+
+def test_modifiers_count_and_mirrored_objects_face_outwards(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+    ball.modifiers.new("Subdivision", 'SUBSURF').levels = 1
+    ball.scale.x = -1.0
+    bpy.context.view_layer.update()
+    found = read(figure)
+    assert found.shapes.shape[1] > 4 * len(ball.data.vertices) - 10
+    assert volume(found.shapes[0], found.faces) > 0.0
+
+
+def test_keys_of_the_same_names_move_along(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+    ball.shape_key_add(name="Basis")
+    moved = ball.shape_key_add(name="Lean")
+    for point in moved.points:
+        point.co.y += 1.0
+    found = read(figure)
+    assert found.moves
+    np.testing.assert_allclose(found.shapes[1] - found.shapes[0], np.broadcast_to([0.0, 1.0, 0.0], (42, 3)), atol=1e-6)
+    moved.name = "Other"
+    assert not read(figure).moves
+
+
+def test_the_object_itself_and_other_kinds_are_left_out(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+    bpy.data.collections["Off"].objects.link(figure)
+    bpy.data.collections["Off"].objects.link(bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", 'POINT')))
+    assert read(figure).shapes.shape[1] == 42
+    assert read_colliders(figure, "", THROUGH) is None
+
+
+@pytest.mark.usefixtures("quick_map")
+class TestBake:
+    def test_it_is_asked_for_and_remembered(
+        self, figure: bpy.types.Object, ball: bpy.types.Object, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        seen = []
+        plan_bake = plans.plan_bake
+
+        def planned(*arguments: Any) -> plans.Plan:  # noqa: ANN401
+            seen.append(plan_bake(*arguments))
+            return seen[-1]
+
+        from qc3d_addon.blender.operators import bake_inbetweens
+
+        monkeypatch.setattr(bake_inbetweens, "plan_bake", planned)
+        assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders="Off") == {'FINISHED'}
+        result = Record.read(figure.data.shape_keys).chains[0].result
+        assert result["collider_crossings"] == 0
+        ball.location.x = 3.0
+        bpy.context.view_layer.update()
+        assert bpy.ops.qc3d.rebake() == {'FINISHED'}
+        first, again = (plan.task.collider for plan in seen)
+        moved = again.shapes - first.shapes
+        np.testing.assert_allclose(moved, np.broadcast_to([1.0, 0.0, 0.0], moved.shape), atol=1e-5)
+        bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean")
+        assert Record.read(figure.data.shape_keys).chains[0].result["collider_crossings"] is None
+
+    def test_the_panel_names_it_too(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+        figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.colliders = "Basis", "Lean", "Off"
+        assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
+        assert Record.read(figure.data.shape_keys).chains[0].request["colliders"] == "Off"
+
+    @pytest.mark.parametrize(
+        ("name", "sentence"), [("None", "no collection 'None'"), ("Empty", "has no other meshes with faces")]
+    )
+    def test_no_collider(self, figure: bpy.types.Object, state: State, name: str, sentence: str) -> None:
+        bpy.data.collections.new("Empty").objects.link(figure)
+        before = state()
+        with pytest.raises(RuntimeError, match=sentence):
+            bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders=name)
+        assert state() == before

@@ -3,7 +3,8 @@
 """Make the demo files from Blender's own primitives, the same every time: python assets/make_assets.py [FOLDER].
 
 ``limb.blend`` is a mannequin's arm on a chest that stays still; ``suzanne.blend`` is Suzanne with expressions;
-``lid.blend`` is a lid that closes over an eyeball, which is in the collection "Eyeball". The shipped files were saved by Blender 4.5, so that 4.5 and everything after it opens them.
+``lid.blend`` is a lid that closes over an eyeball, which is in the collection "Eyeball". The shipped files were saved
+by Blender 4.5, so that 4.5 and everything after it opens them.
 """
 
 from __future__ import annotations

@@ -46,9 +46,13 @@ class Window:
         Width and height of the screen, which the window fills, in pixels.
     package
         Whether to install the add-on from this repository, and enable it.
+    home
+        The user's home as a path inside the root; by default a folder of its own.
     """
 
-    def __init__(self, root: Path, size: tuple[int, int] = (1280, 800), package: bool = True) -> None:
+    def __init__(
+        self, root: Path, size: tuple[int, int] = (1280, 800), package: bool = True, home: str | None = None
+    ) -> None:
         self.root, self.size = root, size
         self.folder = root / "tmp" / f"qc3d-window-{os.getpid()}-{time.monotonic_ns()}"
         self.inside = Path("/tmp") / self.folder.name
@@ -61,7 +65,7 @@ class Window:
             shutil.copytree(REPOSITORY / "qc3d_addon", extension, ignore=shutil.ignore_patterns("__pycache__"))
             shutil.copy(REPOSITORY / "blender_manifest.toml", extension)
         self._environment = {
-            "HOME": str(self.inside),
+            "HOME": home or str(self.inside),
             "PATH": "/usr/sbin:/usr/bin:/sbin:/bin",
             "LC_ALL": "C.UTF-8",
             "TMPDIR": str(self.inside),
@@ -182,6 +186,7 @@ class Window:
         for step in range(1, 11):
             self.move(*(round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True)))
             time.sleep(0.03)
+        time.sleep(0.5)  # a busy Blender takes a quick drag for a click
         self._xdotool("mouseup", "1")
         time.sleep(0.3)
 
@@ -192,6 +197,12 @@ class Window:
     def type(self, text: str) -> None:
         """Type a text."""
         self._xdotool("type", "--delay", "30", text)
+
+    def place_window(self, name: str, left: int, top: int, width: int, height: int) -> None:
+        """Move and size a window of Blender, which no window manager does here."""
+        place = ["windowmove", str(left), str(top), "windowsize", str(width), str(height)]
+        self._xdotool("search", "--sync", "--name", name, *place)
+        time.sleep(1.0)
 
     def open_sidebar(self) -> None:
         """Open the 3D view's sidebar on the tab of the add-on."""
@@ -220,7 +231,9 @@ class Window:
                     time.sleep(0.06)
                     seen.append(self.ask("hovered()"))
                     if button in seen[-1]:
-                        return x, y
+                        time.sleep(0.2)  # Blender may not have seen that the mouse has left another button
+                        if button in self.ask("hovered()"):
+                            return x, y
         raise AssertionError(f"there is no button {button} in the sidebar: {sorted({*seen})}")
 
     def push(self, button: str) -> None:

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Follow the README's quick start for animators click by click in a real Blender, and take its pictures.
+
+    QC3D_BLENDER_ROOT=... python -m tests.window.make_quickstart dist/qc3d-VERSION-linux-x64.zip docs/images
+
+The places that are clicked outside the sidebar are those of Blender 4.3 on a screen of 1280 x 800.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from .harness import REPOSITORY, Window, missing
+
+SCREEN = (1280, 800)
+HOME = "home/animator"
+VIEW_AND_STATUS = (0, 0, 1056, 800)
+SETTLE = 1.0  # seconds in which Blender draws what a click changed
+
+
+def main(package: Path, pictures: Path) -> None:
+    """Take the pictures of the package in use."""
+    root = os.environ.get("QC3D_BLENDER_ROOT")
+    reason = missing(root)
+    if reason is not None:
+        sys.exit(reason)
+    home = Path(root or "") / HOME
+    home.mkdir(parents=True)
+    try:
+        shutil.copy(package, home)
+        shutil.copy(REPOSITORY / "assets/limb.blend", home)
+        with Window(Path(root or ""), SCREEN, package=False, home=f"/{HOME}") as window:
+            window.press("Escape")
+            install(window, pictures)
+            open_file(window, pictures)
+            choose(window, pictures)
+            bake(window, pictures)
+            play(window, pictures)
+    finally:
+        shutil.rmtree(home)
+
+
+def click(window: Window, x: int, y: int) -> None:
+    window.click(x, y)
+    time.sleep(SETTLE)
+
+
+def install(window: Window, pictures: Path) -> None:
+    """Step 1: Edit, Preferences, Get Extensions, Install from Disk."""
+    click(window, 83, 14)
+    click(window, 135, 283)
+    window.place_window("Preferences", 200, 60, 900, 640)
+    click(window, 257, 224)
+    click(window, 1081, 74)
+    window.move(973, 200)
+    time.sleep(SETTLE)
+    window.shoot(pictures / "quickstart-install.png", (200, 60, 900, 240))
+    click(window, 973, 200)
+    click(window, 450, 146)
+    click(window, 1128, 671)
+    window.wait_for("'bl_ext.user_default.qc3d' in bpy.context.preferences.addons")
+    time.sleep(SETTLE)
+    window.move(600, 500)  # keys go to the window under the mouse
+    window.press("ctrl+w")
+    time.sleep(SETTLE)
+
+
+def open_file(window: Window, pictures: Path) -> None:
+    """Step 2: File, Open, and a click on the arm."""
+    window.move(400, 400)
+    window.press("ctrl+o")
+    time.sleep(SETTLE)
+    click(window, 450, 146)
+    click(window, 1128, 671)
+    window.wait_for("'Arm' in bpy.data.objects")
+    click(window, 540, 400)
+    window.press("Home", "n")
+    time.sleep(SETTLE)
+    click(window, 1043, 248)
+
+
+def choose(window: Window, pictures: Path) -> None:
+    """Step 3: the keys to start from and to end with, and keyframes."""
+    for setting, entry in (("qc3d.from_key", 0), ("qc3d.to_key", 3)):
+        x, y = window.find(setting)
+        click(window, x, y)
+        window.move(x, y + 33 + 20 * entry)
+        time.sleep(SETTLE)
+        window.shoot(pictures / "quickstart-keys.png", (640, 80, 620, 340))
+        click(window, x, y + 33 + 20 * entry)
+    window.push("qc3d.use_keyframes")
+    time.sleep(SETTLE)
+
+
+def bake(window: Window, pictures: Path) -> None:
+    """Step 4: the button."""
+    window.push("qc3d.bake_inbetweens")
+    window.move(300, 500)
+    window.ask("import sys; jobs = sys.modules['bl_ext.user_default.qc3d.blender.jobs']")
+    window.wait_for("jobs.current().course.fraction > 0.5")
+    window.shoot(pictures / "quickstart-bake.png", VIEW_AND_STATUS)
+    window.wait_for("'Basis→Bend and twist' in bpy.context.active_object.keys()")
+    time.sleep(SETTLE)
+
+
+def play(window: Window, pictures: Path) -> None:
+    """Step 5: the space bar over the 3D view."""
+    window.press("space")
+    window.wait_for("bpy.context.scene.frame_current >= 12")
+    window.press("space")
+    time.sleep(SETTLE)
+    window.shoot(pictures / "quickstart-play.png", VIEW_AND_STATUS)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

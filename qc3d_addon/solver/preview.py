@@ -45,6 +45,11 @@ class PreviewCurve:
         """Number of vertices n."""
         return int(self._frames.shape[1])
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it keeps, in bytes."""
+        return self._frames.nbytes + self._slopes.nbytes
+
     def at(self, time: float) -> Singles:
         """(n, 3) positions at ``time``, held to 0..1; the frames themselves, bit for bit, at their times."""
         passed = eased(np.clip([time], 0.0, 1.0), self._easing).item()

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live scrub with its button and the mouse on the slider; how often it is drawn; and undo, which it must survive."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from .harness import Window, redraws
+
+BUTTON = "qc3d.live_scrub"
+SLIDER = "Basis→Bend and twist"
+OWN = ["Basis", "Bend 90", "Twist 120", "Bend and twist"]
+MADE = [f"{SLIDER} {step}/4" for step in (1, 2, 3, 4)]
+PREVIEW = "QC3D Preview"
+VERTICES = 6890
+
+
+@pytest.fixture
+def baked(window: Window) -> Window:
+    window.ask(
+        """
+def shown():
+    mesh = arm().evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get('co', values)
+    return values
+
+def offset():
+    '''How far the preview is from the straight blend of the baked keys.'''
+    return float(abs(points('QC3D Preview') - points('Basis')).max()) if 'QC3D Preview' in names() else 0.0
+
+bpy.context.preferences.inputs.use_mouse_continuous = False  # a mouse that is put somewhere by a program
+arm().qc3d.quality = 'draft'
+remember('Draft')
+"""
+    )
+    window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('EXEC_DEFAULT', True)")
+    assert window.ask("names()") == OWN + MADE
+    return window
+
+
+def switch(window: Window) -> None:
+    window.ask("with inside('UI'): bpy.ops.qc3d.live_scrub('EXEC_DEFAULT', True)")
+
+
+def drag_slider(window: Window, right: int = 23) -> float:
+    """Drag the slider with the mouse; where it is then."""
+    x, y = window.find(f'["{SLIDER}"]')
+    before = window.ask(f"arm()[{SLIDER!r}]")
+    window.drag((x, y), (x + right, y))
+    return window.wait(
+        lambda: (place := window.ask(f"arm()[{SLIDER!r}]")) != before and place, "the slider has moved"
+    )
+
+
+def test_the_button_and_the_mouse_on_the_slider(baked: Window) -> None:
+    active = baked.ask("arm().active_shape_key.name")
+    baked.push(BUTTON)
+    baked.wait_for(f"job() is None and names() == {[*OWN, *MADE, PREVIEW]}")
+    assert baked.ask("arm().active_shape_key.name") == active
+    for _ in range(2):
+        drag_slider(baked)
+        assert baked.ask("offset()") > 1e-3
+    baked.push(BUTTON)
+    baked.wait_for(f"names() == {OWN + MADE}")
+
+
+def test_undo_takes_back_the_drag_and_leaves_the_preview(baked: Window) -> None:
+    switch(baked)
+    first = drag_slider(baked)
+    second = drag_slider(baked)
+    assert first != second
+    offset = baked.ask("offset()")
+    baked.press("ctrl+z")  # one step for each drag
+    baked.wait_for(f"arm()[{SLIDER!r}] == {first!r}")
+    assert baked.ask("names()") == [*OWN, *MADE, PREVIEW]
+    baked.press("ctrl+shift+z")
+    baked.wait_for(f"arm()[{SLIDER!r}] == {second!r}")
+    baked.wait_for(f"abs(offset() - {offset}) < 1e-6")
+
+    for _ in range(2):
+        baked.press("ctrl+z")
+    baked.press("ctrl+z")  # the bake
+    baked.wait_for(f"names() == {OWN}")
+    baked.press("ctrl+shift+z")
+    baked.wait_for(f"names() == {OWN + MADE}")
+
+
+def test_what_was_done_with_the_preview_on_is_undone_without_it(baked: Window) -> None:
+    switch(baked)
+    place = drag_slider(baked)
+    drag_slider(baked)
+    switch(baked)
+    assert baked.ask("names()") == OWN + MADE
+    baked.press("ctrl+z")
+    baked.wait_for(f"arm()[{SLIDER!r}] == {place!r}")
+    assert baked.ask("names()") == OWN + MADE
+
+
+@pytest.mark.parametrize("save", [False, True], ids=["", "saved"])
+def test_edit_mode_and_undo_in_it(baked: Window, save: bool) -> None:
+    switch(baked)
+    drag_slider(baked)
+    baked.ask("with inside('WINDOW'): bpy.ops.object.mode_set('EXEC_DEFAULT', True, mode='EDIT')")
+    baked.ask("with inside('WINDOW'): bpy.ops.mesh.select_all('EXEC_DEFAULT', True, action='SELECT')")
+    baked.ask("with inside('WINDOW'): bpy.ops.transform.translate('EXEC_DEFAULT', True, value=(0, 0, 1))")
+    if save:
+        baked.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(baked.inside / 'saved.blend')!r}, copy=True)")
+        baked.wait_for(f"names() == {OWN + MADE}")
+    for keys in ("ctrl+z", "ctrl+z", "ctrl+shift+z", "ctrl+z"):
+        steps = baked.ask("undone = []; bpy.app.handlers.undo_post.append(lambda *_: undone.append(1)); len(undone)")
+        baked.press(keys)
+        baked.wait_for(f"len(undone) > {steps} or {'shift' in keys}")
+        time.sleep(0.3)
+    baked.ask("with inside('WINDOW'): bpy.ops.object.mode_set('EXEC_DEFAULT', True, mode='OBJECT')")
+    baked.ask("arm().update_tag()")
+    baked.wait_for(f"names() == {OWN + MADE}")
+    baked.press("ctrl+z")
+    time.sleep(0.5)
+    baked.ask("with inside('WINDOW'): bpy.ops.object.mode_set('EXEC_DEFAULT', True, mode='OBJECT')")
+    baked.ask("arm().update_tag()")
+    baked.wait_for(f"names() == {OWN + MADE}")
+
+
+def test_every_redraw_shows_where_the_slider_is(window: Window) -> None:
+    window.ask(
+        f"""
+bpy.ops.mesh.primitive_uv_sphere_add(segments=84, ring_count=83)
+ball = bpy.context.active_object
+assert len(ball.data.vertices) == {VERTICES}
+ball.shape_key_add(name='Basis')
+lean = ball.shape_key_add(name='Lean', from_mix=False)
+lean.value = 0.0
+rest = np.empty(3 * len(lean.points), dtype=np.float32)
+lean.points.foreach_get('co', rest)
+rest = rest.reshape(-1, 3)
+lean.points.foreach_set('co', (rest + np.maximum(rest[:, 2:], 0) ** 2 * np.float32([0.8, 0.1, -0.1])).ravel())
+arm().hide_set(True)
+view()[1].spaces.active.shading.type = 'SOLID'
+with inside('WINDOW'):
+    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=3, quality='draft', engine='delaunay')
+
+class Drag:
+    '''Moves the slider a little between redraws, and notes where it is and what is shown at each.'''
+    def __init__(self):
+        self.moves, self.seen = 0, []
+        self.draw = bpy.types.SpaceView3D.draw_handler_add(self.note, (), 'WINDOW', 'POST_PIXEL')
+        bpy.app.timers.register(self.move)
+    def move(self):
+        if self.draw is None:
+            return None
+        self.moves += 1
+        ball['Basis→Lean'] = self.moves % 100 / 100
+        ball.update_tag()
+        return 0.001
+    def note(self):
+        mesh = ball.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        self.seen.append((ball['Basis→Lean'], mesh.vertices[self.watched].co.x))
+    def stop(self):
+        bpy.types.SpaceView3D.draw_handler_remove(self.draw, 'WINDOW')
+        self.draw = None
+        return self.seen
+
+Drag.watched = int(np.argmax(rest[:, 2] - abs(rest[:, 1]) + 0.5 * rest[:, 0]))
+"""
+    )
+    rates: dict[bool, list[float]] = {False: [], True: []}
+    for is_on in (False, True, False, True):
+        window.ask("drag = Drag()")
+        with redraws(window) as gaps:
+            time.sleep(3.0)
+        seen = window.ask("drag.stop()")
+        rates[is_on].append(len(gaps) / sum(gaps))
+        window.ask("with inside('WINDOW'): bpy.ops.qc3d.live_scrub()")
+    without, with_it = (", ".join(f"{rate:.0f}" for rate in rates[is_on]) for is_on in (False, True))
+    print(f"{VERTICES} vertices, slider moving, redraws a second: {without} without the preview, {with_it} with it")
+
+    window.ask(
+        """
+with inside('WINDOW'):
+    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=99, quality='draft', engine='delaunay')
+keys = ball.data.shape_keys.key_blocks
+"""
+    )
+    dense = window.ask("[0.0] + [keys[f'Basis→Lean {step}/100'].points[Drag.watched].co.x for step in range(1, 100)]")
+    dense[0] = window.ask("keys['Basis'].points[Drag.watched].co.x")
+    assert len(seen) > 3
+    for place, shown in seen:
+        assert abs(shown - dense[round(100 * place)]) < 1e-4

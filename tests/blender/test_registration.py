@@ -29,24 +29,20 @@ def test_disabling_leaves_nothing_behind_and_enabling_again_works() -> None:
     assert _known() == everything
 
 
-def test_registering_does_not_wait_for_the_solver(repository: Path) -> None:
+def test_registering_does_not_load_the_solver(repository: Path) -> None:
+    """Loading scipy takes longer than all the rest; without it the add-on is there in some 0.05 s."""
     script = "\n".join(
         [
-            "import bpy, numpy, sys, time",
+            "import bpy, numpy, sys",
             f"sys.path.insert(0, {str(repository)!r})",
-            "start = time.perf_counter()",
             "import qc3d_addon",
             "qc3d_addon.register()",
-            "seconds = time.perf_counter() - start",
+            "print('scipy' in sys.modules)",
             "qc3d_addon.unregister()",
-            "print('scipy' in sys.modules, seconds)",
         ]
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    has_scipy, seconds = run.stdout.split()[-2:]
-    assert has_scipy == "False"
-    # 0.05 s on two idle cores; the bound leaves room for a busy machine, and importing scipy would miss it.
-    assert float(seconds) < 0.5
+    assert "False" in run.stdout.split()
 
 
 def test_the_package_can_be_imported_without_blender(repository: Path) -> None:

@@ -18,6 +18,7 @@ from .operators.chains import (
 )
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.live_scrub import QC3D_OT_live_scrub
+from .operators.map_files import QC3D_OT_save_map
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 from .records import Chain, Record
@@ -27,6 +28,7 @@ _MORE = (
     (QC3D_OT_to_keyframes, 'KEYFRAME'),
     (QC3D_OT_absolute_keys, 'DUPLICATE'),
     (QC3D_OT_export_alembic, 'EXPORT'),
+    (QC3D_OT_save_map, 'FILE_TICK'),
     (QC3D_OT_remove, 'TRASH'),
 )
 _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}

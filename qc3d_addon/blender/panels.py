@@ -11,6 +11,7 @@ from . import checks, jobs, presets, progress
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
 from .operators.cancel import QC3D_OT_cancel
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
+from .operators.map_files import QC3D_OT_load_map
 from .operators.prepare import QC3D_OT_prepare
 from .panel_texts import draw_sentence
 from .properties import ObjectSettings, key_names
@@ -74,7 +75,9 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
             advanced.prop(settings, name)
         advanced.operator_context = IN_THE_SIDEBAR
-        advanced.operator(QC3D_OT_prepare.bl_idname)
+        row = advanced.row(align=True)
+        row.operator(QC3D_OT_prepare.bl_idname)
+        row.operator(QC3D_OT_load_map.bl_idname)
 
 
 def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.types.Key) -> None:

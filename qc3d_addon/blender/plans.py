@@ -24,6 +24,7 @@ from .requests import PREVIEW_STEPS, BakeRequest, BakeResult
 if TYPE_CHECKING:
     from ..solver.keypair import KeyPair
     from ..solver.pipeline import Bake
+    from ..solver.settings import Settings
     from ..solver.task import Outcome, Task
 
 
@@ -109,7 +110,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     record = Record.read(keys)
     pairs = mesh_data.read_pairs(obj, request.keys)
     shape_keys.require_writable(obj, _chain(obj, record, request), request.keyframes)
-    kept = {ends: record.kept_map(keys, _kept(ends, pair, request)) for ends, pair in pairs.items()}
+    kept = {ends: record.kept_map(keys, kept_map(ends, pair, request.settings)) for ends, pair in pairs.items()}
     usable = {ends: data for ends, data in kept.items() if data is not None}
     times = evenly_spaced(request.intervals - 1)
     collider = colliders.read_colliders(obj, request.colliders, request.keys)
@@ -190,20 +191,21 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     return BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
 
 
+def kept_map(ends: tuple[str, str], pair: KeyPair, settings: Settings) -> KeptMap:
+    """Where the map of a pair is kept that was made with these settings."""
+    from ..solver.storage import fingerprint
+
+    # The mode and the easing are no part of it: one map serves them all.
+    return KeptMap(*ends, f"{fingerprint(pair)} {settings.preparation}")
+
+
 def _same(pair: KeyPair, read: KeyPair) -> bool:
     return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in ("key0", "key1", "faces", "edges"))
 
 
-def _kept(ends: tuple[str, str], pair: KeyPair, request: BakeRequest) -> KeptMap:
-    from ..solver.storage import fingerprint
-
-    # The mode and the easing are no part of it: one map serves them all.
-    return KeptMap(*ends, f"{fingerprint(pair)} {request.settings.preparation}")
-
-
 def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome) -> None:
     for ends, data in outcome.maps.items():
-        record.keep_map(keys, _kept(ends, plan.task.pairs[ends], plan.request), data)
+        record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.settings), data)
 
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:

@@ -10,7 +10,7 @@ from typing import get_args, get_type_hints
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..solver.settings import Settings
+from ..solver.settings import OF_THE_FIT, Settings
 from .heat_colours import MEASURE_ITEMS
 from .names import MAX_STEPS
 from .requests import BakeRequest
@@ -167,6 +167,16 @@ def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSe
     for name in shared - {"rna_type", "via"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))
+
+
+def fill_panel(settings: ObjectSettings, keys: tuple[str, ...], chosen: Settings) -> None:
+    """Let the panel show the keys of a map and what it was made with."""
+    settings.from_key, settings.to_key = keys[0], keys[-1]
+    settings.via.clear()
+    for name in keys[1:-1]:
+        settings.via.add().name = name
+    for name in OF_THE_FIT:
+        setattr(settings, name, getattr(chosen, name))
 
 
 def key_names(choices: MapChoices) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from .operators.chains import (
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.live_scrub import QC3D_OT_live_scrub
+from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
 
 CLASSES = (
@@ -38,6 +39,8 @@ CLASSES = (
     QC3D_OT_absolute_keys,
     QC3D_OT_mirror,
     QC3D_OT_export_alembic,
+    QC3D_OT_save_map,
+    QC3D_OT_load_map,
     QC3D_OT_add_inner_key,
     QC3D_OT_remove_inner_key,
     presets.QC3D_MT_presets,

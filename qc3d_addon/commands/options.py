@@ -8,13 +8,11 @@ import argparse
 from typing import get_args
 
 from ..solver.easing import Easing
-from ..solver.settings import Engine, Mode, Quality, Settings
+from ..solver.settings import OF_THE_FIT, Engine, Mode, Quality, Settings
 from ..solver.stretch import StretchLaw
 
 _DEFAULTS = Settings()
-# What a fit depends on; the others are about frames.
-_OF_THE_FIT = ("stretch", "extra_turns", "engine", "quality", "seed")
-_ALL = ("mode", "easing", *_OF_THE_FIT)
+_ALL = ("mode", "easing", *OF_THE_FIT)
 
 
 def add_settings(command: argparse.ArgumentParser, frames: bool = True) -> None:
@@ -26,7 +24,7 @@ def add_settings(command: argparse.ArgumentParser, frames: bool = True) -> None:
         ("engine", get_args(Engine), "what fills the volume around the mesh"),
         ("quality", get_args(Quality), "how fine the volume is"),
     ):
-        if not frames and name not in _OF_THE_FIT:
+        if not frames and name not in OF_THE_FIT:
             continue
         default = getattr(_DEFAULTS, name)
         command.add_argument(f"--{name}", choices=choices, default=default, help=f"{text} (default: {default})")

@@ -16,6 +16,10 @@ Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["draft", "normal", "fine"]
 
 
+# What a prepared map depends on; the other choices are about frames.
+OF_THE_FIT = ("stretch", "extra_turns", "engine", "quality", "seed")
+
+
 @dataclass(frozen=True)
 class Settings:
     """The choices of one bake.

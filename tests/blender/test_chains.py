@@ -28,6 +28,7 @@ OPERATORS = (
     "absolute_keys",
     "mirror",
     "export_alembic",
+    "save_map",
     "select_worst",
     "heat_map",
     "rebake",

@@ -8,12 +8,14 @@ import hashlib
 import io
 import json
 import pickle
+import zipfile
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.lib import format as npy
 
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.keypair import KeyPair
@@ -216,3 +218,19 @@ class TestWrongContents:
         self.refused("damaged", maps=found["maps"] * [1.0, 1.0, -1.0])
         self.refused("damaged", maps=found["maps"] * [1.0, 1.0, 0.0])
         self.refused("damaged", points=found["points"] * [1.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("shape", [(2**40, 3), (2**62, 2**62), (1, 3)])
+def test_an_array_that_is_not_as_large_as_it_says(shape: tuple[int, int]) -> None:
+    buffer = io.BytesIO(STORED[SEAL:])
+    header = io.BytesIO()
+    npy.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with zipfile.ZipFile(buffer) as whole:
+        entries = {name: whole.read(name) for name in whole.namelist()}
+    entries["points.npy"] = header.getvalue() + bytes(240)
+    changed = io.BytesIO()
+    with zipfile.ZipFile(changed, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    with pytest.raises(InputError, match="damaged"):
+        from_bytes(hashlib.sha256(changed.getvalue()).digest() + changed.getvalue(), PAIR)

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators that save the maps of a bake and load them for the same mesh in another file."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ...solver.errors import InputError, QC3DError
+from .. import map_exchange
+from ..properties import fill_panel
+from ..records import Chain, Record
+from .chains import ChainWork
+from .common import SLIDER, poll_active_object, poll_chains
+
+_ENDING = ".qc3dmap"
+_FILTER = StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})
+
+
+class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
+    """Save the map that these in-betweens were made from, for the same mesh in another file"""
+
+    bl_idname = "qc3d.save_map"
+    bl_label = "Save Map"
+    bl_options: ClassVar[set[str]] = {'REGISTER'}  # nothing in the file changes
+
+    slider: SLIDER
+    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+    check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+    filter_glob: _FILTER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = f"{bpy.path.clean_name(context.active_object.name)}{_ENDING}"
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        path = _path(self.filepath, "write to")
+        count = map_exchange.save_maps(obj, chain, path)
+        return [f"{path.name} has {'the map' if count == 1 else f'{count} maps'} of '{chain.slider}'."]
+
+
+class QC3D_OT_load_map(bpy.types.Operator):
+    """Load maps that were saved for the same mesh and shape keys: the next bake of these keys only makes frames"""
+
+    bl_idname = "qc3d.load_map"
+    bl_label = "Load Map"
+    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+
+    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+    filter_glob: _FILTER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.active_object
+        try:
+            loaded = map_exchange.load_maps(obj, _path(self.filepath, "read"))
+        except QC3DError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        # A map serves bakes with the choices it was made with; the panel shows them from now on.
+        fill_panel(obj.qc3d, loaded.through, loaded.settings)
+        names = " to ".join(f"'{name}'" for name in loaded.through)
+        self.report({'INFO'}, f"The map from {names} is ready; the panel has its choices.")
+        return {'FINISHED'}
+
+
+def _path(name: str, purpose: str) -> Path:
+    if not name:
+        raise InputError(f"Name a file to {purpose}.")
+    return Path(bpy.path.ensure_ext(bpy.path.abspath(name), _ENDING))

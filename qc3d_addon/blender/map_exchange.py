@@ -37,7 +37,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
         data = record.kept_map(keys, kept_map(ends, pair, settings))
         if data is None:
-            raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is not that of the keys any more; re-bake first.")
+            raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is no more that of the keys; re-bake first.")
         maps[ends] = data
     write_maps(path, KeptMaps(chain.through, settings, maps))
     return len(maps)

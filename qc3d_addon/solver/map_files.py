@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The prepared maps of a row of keys as one file: for another copy of the same mesh, which then need not be fitted.
 
-A file is a magic word, a version, a header in JSON and the maps as ``storage.to_bytes`` makes them. Nothing in it is the
-name of a file, or run.
+A file is a magic word, a version, a header in JSON and the maps as ``storage.to_bytes`` makes them. Nothing in it is
+the name of a file, or run.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def test_maps_of_keys_that_were_changed_are_not_saved(
 ) -> None:
     bake(from_key="Basis", to_key="Lean")
     figure.data.shape_keys.key_blocks["Lean"].points[0].co.x += 0.001
-    with pytest.raises(RuntimeError, match="is not that of the keys any more; re-bake first"):
+    with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
         bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
     assert not list(tmp_path.iterdir())
 

@@ -72,8 +72,9 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     header, advanced = layout.panel("QC3D_advanced", default_closed=True)
     header.label(text="Advanced")
     if advanced is not None:
+        choices = advanced.column()
         for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
-            advanced.prop(settings, name)
+            choices.prop(settings, name)
         advanced.operator_context = IN_THE_SIDEBAR
         row = advanced.row(align=True)
         row.operator(QC3D_OT_prepare.bl_idname)

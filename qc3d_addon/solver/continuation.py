@@ -17,6 +17,7 @@ from .tetmesh import Floats
 
 STEP_DEGREES = 20.0
 _STEP_ITERATIONS = 12
+_PATH_SWEEPS = 4  # the shapes on the way only lead the map; they need not have settled
 _LAST_ITERATIONS = 40
 
 
@@ -62,7 +63,7 @@ def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Gene
     turns = np.zeros((len(mesh.tets), 3))
     for step in range(1, steps + 1):
         last = step == steps
-        target = key1 if last else path.positions(step / steps)
+        target = key1 if last else path.positions(step / steps, sweeps=_PATH_SWEEPS)
         maps[step] = fitter.fit(maps[step - 1], target, _LAST_ITERATIONS if last else _STEP_ITERATIONS)
         turns = nearest_branch(rotation_vectors(polar_decomposition(mesh.jacobians(maps[step])).rotation), turns)
         yield step / steps

@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from .surface import cross_product
 from .tetmesh import Bools, Floats, Ints
 
 # Triangles are searched for by size: those of one level are up to so many times smaller than those of the last.
@@ -19,34 +21,40 @@ _CHUNK = 2_000_000
 _TOUCHING = 1e-10
 
 
-def crossing_pairs(points: Floats, faces: Ints) -> Ints:
+def crossing_pairs(points: Floats, faces: Ints, moving: Bools | None = None) -> Ints:
     """Pairs of triangles that share no vertex and cross; touching does not count.
 
     Parameters
     ----------
     points : (n, 3)
     faces : (m, 3) int64
+    moving : (m,) bool, optional
+        Only pairs are looked for of which at least one triangle is among these.
 
     Returns
     -------
     (k, 2) int64, smaller index first, sorted.
     """
-    if len(faces) < 2:
+    if len(faces) < 2 or (moving is not None and not moving.any()):
         return np.empty((0, 2), dtype=np.int64)
-    corners = points[faces]
+    corners = np.ascontiguousarray(points.T)[:, faces.T]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    depth = _TOUCHING * float((high.max(axis=0) - low.min(axis=0)).max())
+    depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
+    triangles = _Triangles.of(corners)
     codes = [np.empty(0, dtype=np.int64)]
-    for first, second in _candidates(low, high):
-        kept = _near_and_apart(low, high, faces, first, second)
-        first, second = first[kept], second[kept]
-        crossing = _cross(corners[first], corners[second], depth)
+    for first, second in _candidates(low.T, high.T, moving):
+        for axis in range(3):
+            met = (low[axis, first] <= high[axis, second]) & (low[axis, second] <= high[axis, first])
+            first, second = first[met], second[met]
+        apart = ~_share_a_vertex(faces[first], faces[second])
+        first, second = first[apart], second[apart]
+        crossing = _cross(triangles, first, second, depth)
         codes.append(first[crossing] * len(faces) + second[crossing])
     unique = np.unique(np.concatenate(codes))
     return np.stack([unique // len(faces), unique % len(faces)], axis=1)
 
 
-def _candidates(low: Floats, high: Floats) -> Iterator[tuple[Ints, Ints]]:
+def _candidates(low: Floats, high: Floats, moving: Bools | None) -> Iterator[tuple[Ints, Ints]]:
     """Pairs of boxes that share a cell of a grid, the smaller index first, in chunks.
 
     There is a grid for each level of size. Its cells are as large as its boxes, which meet each other and all smaller
@@ -65,6 +73,13 @@ def _candidates(low: Floats, high: Floats) -> Iterator[tuple[Ints, Ints]]:
         smaller = levels[members[owner]] > level
         order = np.lexsort((smaller, code))
         owner, code, smaller = members[owner[order]], code[order], smaller[order]
+        if moving is not None:
+            starts = np.flatnonzero(np.diff(code, prepend=-1))
+            moved_in = np.logical_or.reduceat(moving[owner], starts)
+            kept = np.repeat(moved_in, np.diff(starts, append=len(code)))
+            owner, code, smaller = owner[kept], code[kept], smaller[kept]
+            if not len(code):
+                continue
         # Every entry of the level meets the later entries of its cell, the smaller ones after those of the level.
         ends = np.searchsorted(code, code, side="right")
         partners = np.where(smaller, 0, ends - np.arange(len(code)) - 1)
@@ -77,6 +92,9 @@ def _candidates(low: Floats, high: Floats) -> Iterator[tuple[Ints, Ints]]:
             left = np.repeat(np.arange(begin, end), repeats)
             right = left + 1 + np.arange(len(left)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
             first, second = owner[left], owner[right]
+            if moving is not None:
+                concerned = moving[first] | moving[second]
+                first, second = first[concerned], second[concerned]
             yield np.minimum(first, second), np.maximum(first, second)
             begin = end
 
@@ -96,41 +114,73 @@ def _covered_cells(low: Floats, high: Floats, cell: float) -> tuple[Ints, Ints]:
     return owner, (place[:, 0] * size[1] + place[:, 1]) * size[2] + place[:, 2]
 
 
-def _near_and_apart(low: Floats, high: Floats, faces: Ints, first: Ints, second: Ints) -> Bools:
-    """Whether bounding boxes overlap and no vertex is shared."""
-    kept = np.ones(len(first), dtype=bool)
-    for axis in range(3):
-        kept &= (low[first, axis] <= high[second, axis]) & (low[second, axis] <= high[first, axis])
-    near = np.flatnonzero(kept)
-    corners, others = faces[first[near]], faces[second[near]]
-    for corner in range(3):
-        kept[near] &= (corners[:, corner, None] != others).all(axis=1)
-    return kept
+def _share_a_vertex(first: Ints, second: Ints) -> Bools:
+    """(k,) whether triangles (k, 3) have a corner in common."""
+    shared = np.zeros(len(first), dtype=bool)
+    for corner in first.T:
+        for other in second.T:
+            shared |= corner == other
+    return shared
 
 
-def _cross(first: Floats, second: Floats, depth: float) -> Bools:
-    """Whether triangles (k, 3, 3) cross deeper than ``depth``: an edge of one goes through the inside of the other."""
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """Corners (3, 3, m), by coordinate and corner, normals (3, m), and lengths of both for the rounding of heights."""
+
+    corners: Floats
+    normals: Floats
+    reaches: Floats
+    sizes: Floats
+
+    @classmethod
+    def of(cls, corners: Floats) -> _Triangles:
+        along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        normals = cross_product(along, across)
+        lengths = [np.sqrt((vectors**2).sum(axis=0)) for vectors in (along, across, normals)]
+        return cls(corners, normals, lengths[0] + lengths[1], lengths[2])
+
+    def heights(self, members: Ints, others: Ints, depth: float) -> Floats:
+        """(3, k) of the corners of ``others`` (k,) over the planes of ``members``; zero where that is no depth."""
+        normals = self.normals[:, members]
+        heights = np.empty((3, len(members)))
+        for corner in range(3):
+            offsets = self.corners[:, corner, others] - self.corners[:, 0, members]
+            height = (offsets * normals).sum(axis=0)
+            # What moving every corner by the depth can change: in one plane only rounding would decide.
+            distance = np.sqrt((offsets**2).sum(axis=0))
+            change = self.sizes[members] + distance * self.reaches[members]
+            heights[corner] = np.where(np.abs(height) <= depth * change, 0.0, height)
+        return heights
+
+
+def _cross(triangles: _Triangles, first: Ints, second: Ints, depth: float) -> Bools:
+    """Whether triangles cross deeper than ``depth``: an edge of one goes through the inside of the other."""
     result = np.zeros(len(first), dtype=bool)
-    for triangle, other in ((first, second), (second, first)):
-        along, across = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
-        normals, offsets = np.cross(along, across), other - triangle[:, None, 0]
-        heights = np.einsum("kci,ki->kc", offsets, normals)
-        # What moving every corner by the depth can change: in one plane only rounding would decide.
-        reach = np.linalg.norm(along, axis=1) + np.linalg.norm(across, axis=1)
-        change = np.linalg.norm(normals, axis=1)[:, None] + np.linalg.norm(offsets, axis=2) * reach[:, None]
-        heights[np.abs(heights) <= depth * change] = 0.0
-        for start in range(3):
-            end = (start + 1) % 3
-            apart = heights[:, start] * heights[:, end] < 0.0
-            near = np.flatnonzero(apart & ~result)
-            tail, head = other[near, start], other[near, end]
-            turns = np.stack(
-                [_orientation(tail, head, triangle[near, k], triangle[near, (k + 1) % 3]) for k in range(3)], axis=1
-            )
-            result[near] = (turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)
+    heights = triangles.heights(first, second, depth)
+    # A triangle on one side of the other's plane is apart from it.
+    near = np.flatnonzero(~((heights > 0.0).all(axis=0) | (heights < 0.0).all(axis=0)))
+    first, second = first[near], second[near]
+    crossing = _pierced(triangles, first, second, heights[:, near])
+    crossing |= _pierced(triangles, second, first, triangles.heights(second, first, depth))
+    result[near] = crossing
+    return result
+
+
+def _pierced(triangles: _Triangles, members: Ints, others: Ints, heights: Floats) -> Bools:
+    """Whether an edge of ``others`` (k,), whose corners have ``heights`` (3, k), goes through ``members``."""
+    result = np.zeros(len(members), dtype=bool)
+    for start in range(3):
+        end = (start + 1) % 3
+        near = np.flatnonzero((heights[start] * heights[end] < 0.0) & ~result)
+        tail, head = triangles.corners[:, start, others[near]], triangles.corners[:, end, others[near]]
+        triangle = triangles.corners[:, :, members[near]]
+        turns = [_orientation(tail, head, triangle[:, k], triangle[:, (k + 1) % 3]) for k in range(3)]
+        result[near] = np.logical_and.reduce([turn > 0.0 for turn in turns]) | np.logical_and.reduce(
+            [turn < 0.0 for turn in turns]
+        )
     return result
 
 
 def _orientation(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
-    """Six times the signed volume of the tetrahedra a, b, c, d."""
-    return np.asarray(np.einsum("...i,...i->...", d - a, np.cross(b - a, c - a)))
+    """(k,) six times the signed volumes of the tetrahedra with corners a, b, c, d, each (3, k)."""
+    return np.asarray(((d - a) * cross_product(b - a, c - a)).sum(axis=0))

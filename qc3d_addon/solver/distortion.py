@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from .rotations import determinants
-from .surface import hat_gradients, planar_jacobians, tangent_bases
+from .surface import cross_product, gradient_operator, hat_gradients, tangent_bases
 from .tetmesh import Floats, Ints
 
 # Triangles whose area is below this part of their squared edges have no directions in floating point.
@@ -23,6 +23,24 @@ def singular_values(jacobians: Floats) -> Floats:
     """(m, 3) singular values a >= b >= |c| of Jacobians (m, 3, 3); c < 0 where the map is folded."""
     values = np.linalg.svd(jacobians, compute_uv=False)
     values[:, 2] *= np.where(determinants(jacobians) < 0.0, -1.0, 1.0)
+    return np.asarray(values)
+
+
+def approximate_singular_values(jacobians: Floats) -> Floats:
+    """The same to about 1e-8 of the largest, several times faster: eigenvalues of J^T J in closed form.
+
+    After Smith (1961), "Eigenvalues of a symmetric 3 x 3 matrix". The smallest follows from the determinant.
+    """
+    metric = jacobians.transpose(0, 2, 1) @ jacobians
+    mean = np.einsum("kii->k", metric) / 3.0
+    deviation = metric - mean[:, None, None] * np.eye(3)
+    spread = np.sqrt(np.einsum("kij,kij->k", deviation, deviation) / 6.0)
+    cosine = determinants(deviation) / np.maximum(2.0 * spread**3, 1e-300)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
+    largest = mean + 2.0 * spread * np.cos(angle)
+    smallest = mean + 2.0 * spread * np.cos(angle + 2.0 / 3.0 * np.pi)
+    values = np.sqrt(np.maximum(np.stack([largest, 3.0 * mean - largest - smallest, smallest], axis=1), 0.0))
+    values[:, 2] = determinants(jacobians) / np.maximum(values[:, 0] * values[:, 1], 1e-300)
     return np.asarray(values)
 
 
@@ -61,16 +79,18 @@ class TriangleStretches:
         edges = rest[faces[:, 1:]] - rest[faces[:, :1]]
         areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         self._usable = areas > _FLAT * (edges**2).sum(axis=(1, 2))
-        self._faces = faces[self._usable]
-        self._gradients = hat_gradients(rest, self._faces, tangent_bases(rest, self._faces))
+        faces = faces[self._usable]
+        self._gradient = gradient_operator(faces, hat_gradients(rest, faces, tangent_bases(rest, faces)), len(rest))
 
     def of(self, shape: Floats) -> Floats:
         """(m, 2) largest and smallest length ratio of each triangle from the rest shape to ``shape`` (n, 3)."""
-        bases = tangent_bases(shape, self._faces)
-        planar = planar_jacobians(shape, self._faces, bases, self._gradients)
+        first, second = np.stack([self._gradient @ row for row in shape.T]).reshape(3, 2, -1).transpose(1, 0, 2)
+        # In the basis of the first image and what is across it, the images are (length, 0) and (along, across).
+        length = np.maximum(np.sqrt((first**2).sum(axis=0)), 1e-300)
+        along = (first * second).sum(axis=0) / length
+        across = np.sqrt((cross_product(first, second) ** 2).sum(axis=0)) / length
         # Singular values in closed form: the parts of a 2 x 2 matrix that turn and that reflect.
-        turning = np.hypot(planar[:, 0, 0] + planar[:, 1, 1], planar[:, 1, 0] - planar[:, 0, 1])
-        reflecting = np.hypot(planar[:, 0, 0] - planar[:, 1, 1], planar[:, 1, 0] + planar[:, 0, 1])
+        turning, reflecting = np.hypot(length + across, along), np.hypot(length - across, along)
         ratios = np.full((len(self._usable), 2), np.nan)
         ratios[self._usable] = 0.5 * np.stack([turning + reflecting, np.abs(turning - reflecting)], axis=1)
         return ratios

@@ -52,7 +52,9 @@ class LinearFrames:
     def __init__(self, prepared: PreparedMap) -> None:
         self._prepared = prepared
         self._maps = LinearMaps(prepared.mesh, prepared.mapped)
-        self._limit = CrossingLimit(prepared.pair.faces, prepared.embedding.key0, prepared.embedding.key1)
+        self._limit = CrossingLimit(
+            prepared.pair.faces, prepared.embedding.key0, prepared.embedding.key1, prepared.embedding.still
+        )
         self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
 
     def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from .distortion import TriangleStretches, dilatation, extreme_stretch, singular_values, volume_ratio
+from .distortion import TriangleStretches, approximate_singular_values, dilatation, extreme_stretch, volume_ratio
 from .keypair import KeyPair
+from .parallel import in_threads
 from .prepared import PreparedMap
 from .tetmesh import Floats, Ints
 
@@ -45,15 +46,16 @@ def measure(
     """
     vertex_measures = VertexMeasures(prepared)
     measures: dict[str, NDArray[np.float32]] = {}
-    for index, (number, frame) in enumerate(zip(segments.tolist(), frames, strict=True)):
-        for name, at_vertices in vertex_measures.of(number, frame, values[index]).items():
+    moments = zip(segments.tolist(), frames, values, strict=True)
+    for index, found in enumerate(in_threads(lambda moment: vertex_measures.of(*moment), moments)):
+        for name, at_vertices in found.items():
             measures.setdefault(name, np.empty(frames.shape[:2], dtype=np.float32))[index] = at_vertices
     worst = Excess(0.0, 0, 0)
     for number, part in enumerate(prepared):
         members = np.flatnonzero(segments == number)
-        found = worst_excess(part.pair, frames[members])
-        if found.ratio > worst.ratio:
-            worst = found._replace(frame=int(members[found.frame]))
+        beyond = worst_excess(part.pair, frames[members])
+        if beyond.ratio > worst.ratio:
+            worst = beyond._replace(frame=int(members[beyond.frame]))
     return measures, {"excess": worst.ratio, "frame": worst.frame, "vertex": worst.vertex}
 
 
@@ -97,7 +99,7 @@ class VertexMeasures:
         values : (N, 3)
             Its map, cube units.
         """
-        singular = singular_values(self._jacobians(number, values) @ self._before[number])
+        singular = approximate_singular_values(self._jacobians(number, values) @ self._before[number])
         return {
             "stretch": self._at_vertices(extreme_stretch(self._triangles.of(positions))),
             "volume": np.maximum(volume_ratio(singular), 0.0),

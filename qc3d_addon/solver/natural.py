@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Generator
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 from .branches import Turning, swing_beside
 from .colliders import Guard
 from .frame import Frame
+from .parallel import in_threads
 from .prepared import PreparedMap
 from .rates import Rates, hermite
 from .spins import ExtraSpins
@@ -43,13 +45,13 @@ class NaturalFrames:
         self._prepared = prepared
         self.notes: tuple[str, ...] = ()
         embedding, mesh = prepared.embedding, prepared.mesh
-        self._surface = SurfacePath(embedding, law, prepared.extra_turns != 0)
+        self._surface = prepared.surface_path(law)
         self._spins = ExtraSpins(embedding, self._surface, prepared.extra_turns)
         if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         turning = _turning_inside(prepared, self._surface)
         self._volume = VolumePath(mesh, prepared.mapped, turning, prepared.insideness, law)
-        self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1)
+        self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1, self.still)
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
             key - prepared.landmarks @ self._volume.at(time)
@@ -111,15 +113,17 @@ class NaturalFrames:
 
     def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, kept off by ``guard``; yields the part that is done."""
-        volumes, positions = [], []
-        for index, time in enumerate(times.tolist()):
-            yield index / len(times)
-            volumes.append(self._volume.at(time))
-            positions.append(self._shaped(self._surface, volumes[-1], time))
-        positions, crossings = yield from self._uncrossed(times, volumes, positions)
+        volumes, positions, excess = [], [], []
+        yield 0.0
+        for values, shape, crossing in in_threads(self._first_try, times.tolist()):
+            volumes.append(values)
+            positions.append(shape)
+            excess.append(crossing)
+            yield len(volumes) / len(times)
+        positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
         if guard is not None:
             positions = yield from self._kept_off(guard, times, volumes, positions)
-            crossings = [self._limit.excess(shape) for shape in positions]
+            crossings = list(in_threads(self._limit.excess, positions))
         made = []
         for index, time in enumerate(times.tolist()):
             values = volumes[index]
@@ -128,6 +132,12 @@ class NaturalFrames:
             shape = self._placed(positions[index], time)
             made.append(Frame.of(self._prepared, shape, unfolded, time, folded, crossings[index]))
         return made
+
+    def _first_try(self, time: float) -> tuple[Floats, Floats, int]:
+        """Values (N, 3) of the map at ``time``, the surface's cube positions (n, 3), and their excess of crossings."""
+        values = self._volume.at(time)
+        shape = self._shaped(self._surface, values, time)
+        return values, shape, self._limit.excess(shape)
 
     def _placed(self, shape: Floats, time: float) -> Floats:
         """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
@@ -142,18 +152,20 @@ class NaturalFrames:
         """(n, 3) cube positions of a surface drawn to a map of the cube, its extra turns added."""
         return self._spins.apply(surface.positions(time, self._anchor(values, time)), time)
 
+    def _shaped_at(self, surface: SurfacePath, moment: tuple[Floats, float]) -> Floats:
+        return self._shaped(surface, *moment)
+
     def _anchor(self, values: Floats, time: float) -> Floats:
         """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
         return np.asarray(self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1])
 
     def _uncrossed(
-        self, times: Floats, volumes: list[Floats], positions: list[Floats]
+        self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int]
     ) -> Generator[float, None, tuple[list[Floats], list[int]]]:
         """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps.
 
         Returns the positions and what is left of the excess of crossings in each frame.
         """
-        excess = [self._limit.excess(shape) for shape in positions]
         reach = np.zeros(len(self.still))
         for attempt in range(_UNCROSSING_ATTEMPTS):
             if not any(excess):
@@ -162,8 +174,8 @@ class NaturalFrames:
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = [self._shaped(surface, values, time) for time, values in zip(times.tolist(), volumes, strict=True)]
-            remaining = [self._limit.excess(shape) for shape in tried]
+            tried = list(in_threads(partial(self._shaped_at, surface), zip(volumes, times.tolist(), strict=True)))
+            remaining = list(in_threads(self._limit.excess, tried))
             if sum(remaining) >= sum(excess):
                 break
             positions, excess = tried, remaining

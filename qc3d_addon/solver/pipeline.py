@@ -135,6 +135,7 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
         settings.quality,
         filled.notes,
         seconds,
+        {settings.stretch: path},
     )
     missed = prepared.landmark_residual()["rms"]
     if path.inside_out:

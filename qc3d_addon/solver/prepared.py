@@ -15,6 +15,8 @@ from .foldfree import FoldFreeFitter
 from .keypair import KeyPair
 from .location import interpolation_matrix
 from .rotations import determinants
+from .stretch import StretchLaw
+from .surface_path import SurfacePath
 from .tetmesh import Floats, TetMesh
 from .winding import insideness, winding_numbers
 
@@ -45,6 +47,8 @@ class PreparedMap:
         Sentences for the user, such as why another engine ran.
     seconds : dict
         Time spent per stage.
+    paths : dict
+        What ``surface_path`` has set up already.
     """
 
     pair: KeyPair
@@ -56,6 +60,7 @@ class PreparedMap:
     quality: str
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    paths: dict[StretchLaw, SurfacePath] = field(default_factory=dict, repr=False)
 
     @property
     def mapped(self) -> Floats:
@@ -66,6 +71,12 @@ class PreparedMap:
     def embedding(self) -> Embedding:
         """The pair in cube units."""
         return Embedding.of(self.pair)
+
+    def surface_path(self, law: StretchLaw) -> SurfacePath:
+        """The surface's own path between the keys; kept, because setting it up costs as much as several frames."""
+        if law not in self.paths:
+            self.paths[law] = SurfacePath(self.embedding, law, self.extra_turns != 0)
+        return self.paths[law]
 
     @cached_property
     def landmarks(self) -> csr_array:

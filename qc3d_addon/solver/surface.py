@@ -75,52 +75,61 @@ class TriangleDeformation:
         turns = rotation_vectors(rotations)
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
 
-    def gradient_operator(self, count: int) -> csr_array:
-        """(2m, count): takes positions (count, 3) to their gradients along the first, then the second tangents."""
-        triangles = len(self.faces)
-        columns = np.concatenate([self.faces, self.faces]).ravel()
-        values = self.gradients.transpose(2, 0, 1).ravel()
-        starts = np.arange(0, 6 * triangles + 1, 3)
-        return csr_array((values, columns, starts), shape=(2 * triangles, count))
+
+def gradient_operator(faces: Ints, gradients: Floats, count: int) -> csr_array:
+    """(2m, count): takes coordinates (count,) to their gradients along the first, then the second tangents.
+
+    Parameters
+    ----------
+    faces : (m, 3)
+    gradients : (m, 3, 2)
+        Of the hat functions.
+    count : int
+        How many vertices there are.
+    """
+    columns = np.concatenate([faces, faces]).ravel()
+    values = gradients.transpose(2, 0, 1).ravel()
+    return csr_array((values, columns, np.arange(0, 6 * len(faces) + 1, 3)), shape=(2 * len(faces), count))
 
 
 def tangents_of(rotations: Floats, bases: Floats) -> Floats:
-    """(2, m, 3) the two tangents of ``bases`` (m, 3, 3) after ``rotations`` (m, 3, 3)."""
-    return np.ascontiguousarray((rotations @ bases[:, :, :2]).transpose(2, 0, 1))
+    """(3, 2, m) the two tangents of ``bases`` (m, 3, 3) after ``rotations`` (m, 3, 3), by coordinate."""
+    return np.ascontiguousarray((rotations @ bases[:, :, :2]).transpose(1, 2, 0))
 
 
 def stretched(stretch: Floats, vectors: Floats) -> Floats:
-    """(2, m, 3) pairs of vectors (2, m, 3), mixed by symmetric stretches (m, 2, 2)."""
-    first, second = vectors
-    mixed = stretch[:, 0, 1][:, None]
-    return np.stack(
-        [stretch[:, 0, 0][:, None] * first + mixed * second, mixed * first + stretch[:, 1, 1][:, None] * second]
-    )
+    """(3, 2, m) pairs of vectors (3, 2, m), mixed by symmetric stretches (m, 2, 2)."""
+    along, mixed, across = stretch[:, 0, 0], stretch[:, 0, 1], stretch[:, 1, 1]
+    first, second = vectors[:, 0], vectors[:, 1]
+    return np.stack([along * first + mixed * second, mixed * first + across * second], axis=1)
 
 
-def closest_tangents(vectors: Floats) -> Floats:
-    """(2, m, 3) orthonormal pairs closest to pairs of vectors (2, m, 3): the polar factor A (A^T A)^-1/2.
+def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
+    """(3, 2, m) orthogonal pairs of ``lengths`` (m,), in the directions closest to pairs of vectors (3, 2, m).
 
-    The inverse root of the 2 x 2 matrix C = A^T A comes from the theorem of Cayley and Hamilton: with s = sqrt(det C),
-    C^1/2 = (C + s I) / sqrt(tr C + 2 s).
+    The directions are the polar factor A (A^T A)^-1/2. The inverse root of the 2 x 2 matrix C = A^T A comes from the
+    theorem of Cayley and Hamilton: with s = sqrt(det C), C^1/2 = (C + s I) / sqrt(tr C + 2 s).
     """
-    first, second = vectors
-    one, two = (np.einsum("mi,mi->m", vector, vector) for vector in vectors)
-    mixed = np.einsum("mi,mi->m", first, second)
+    first, second = vectors[:, 0], vectors[:, 1]
+    (x, y, z), (u, v, w) = first, second
+    one, two, mixed = x * x + y * y + z * z, u * u + v * v + w * w, x * u + y * v + z * w
     trace = one + two
     # From the cross product: one * two - mixed**2 loses a triangle flattened by 1e-4 to rounding. One that is a line
     # for a moment still gets two directions; the floor is far below any real triangle.
-    (x, y, z), (u, v, w) = first.T, second.T
     root = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
-    root = np.maximum(root, _THINNEST * trace)
-    scale = 1.0 / np.maximum(root * np.sqrt(trace + 2.0 * root), 1e-300)
-    across = (scale * mixed)[:, None]
-    return np.stack(
-        [
-            (scale * (two + root))[:, None] * first - across * second,
-            (scale * (one + root))[:, None] * second - across * first,
-        ]
-    )
+    np.maximum(root, _THINNEST * trace, out=root)
+    scale = lengths / np.maximum(root * np.sqrt(trace + 2.0 * root), 1e-300)
+    across = scale * mixed
+    closest = np.empty_like(vectors)
+    np.subtract((scale * (two + root)) * first, across * second, out=closest[:, 0])
+    np.subtract((scale * (one + root)) * second, across * first, out=closest[:, 1])
+    return closest
+
+
+def cross_product(first: Floats, second: Floats) -> Floats:
+    """(3, k) cross products of vectors (3, k), stored by coordinate."""
+    (x, y, z), (u, v, w) = first, second
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def face_normals(positions: Floats, faces: Ints) -> Floats:

@@ -7,11 +7,9 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from .anchors import ScrewAnchors
-from .branches import consistent_turning
+from .branches import Turning, consistent_turning
 from .embedding import Embedding
 from .enclosed import ClosedComponents
 from .rates import (
@@ -24,19 +22,14 @@ from .rates import (
     strain_of_slope,
     stretch_slopes,
 )
-from .stiffness import StiffnessPattern, scatter, stiffness_elements
-from .stretch import StretchLaw
-from .surface import TriangleDeformation, closest_tangents, stretched, tangents_of
+from .stretch import Stretch, StretchLaw
+from .surface import TriangleDeformation, tangents_of
+from .surface_sweeps import MovingSurface, Sweeps, Wanted
 from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
-SWEEPS = 30
-# Going further than each sweep asks for takes as many sweeps off as there are taken (over-relaxation).
-_OVER_RELAXATION = 1.7
-_LARGEST_VOLUME_STEP = 0.1
-_LAST_VOLUME_STEPS = 12
-_VOLUME_TOLERANCE = 1e-12
+SWEEPS = 14
 _LEAST_VOLUME = 1e-12
 
 
@@ -96,18 +89,20 @@ class SurfacePath:
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
         area = float(self.deformation.weights.sum()) or size**2
         self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
-        self._gradient = usable.gradient_operator(count)
-        self._divergence = csr_array(self._gradient.T @ diags_array(np.tile(usable.weights, 2)))
         self._correction: EndCorrection | None = None
-        self._factor()
+        self._surface = MovingSurface(
+            usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights
+        )
+        rows = self._surface.rows
+        self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
+        self._moving_stretch = Stretch(usable.stretch.values[rows], usable.stretch.vectors[rows])
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
         """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
         np.maximum.at(strongest, self._group, factors)
-        stronger._anchor_weights = self._anchor_weights * strongest
-        stronger._factor()
+        stronger._surface = self._surface.with_anchor_weights(self._anchor_weights * strongest)
         return stronger
 
     def end_rates(self) -> tuple[Rates, Rates]:
@@ -140,85 +135,34 @@ class SurfacePath:
         first, second = (np.where(np.abs(volume) > _LEAST_VOLUME, volume, 0.0) for volume in self._volumes)
         return int(np.count_nonzero(first * second < 0.0))
 
-    def _factor(self) -> None:
-        deformation, free = self.deformation, self._free
-        count = len(free)
-        spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(self._springs), 2, 2))
-        matrix = csc_array(
-            StiffnessPattern(deformation.faces, count).assemble(
-                stiffness_elements(deformation.weights, deformation.gradients)
-            )
-            + StiffnessPattern(self._springs, count).assemble(spring)
-            + diags_array(self._anchor_weights)
-        )
-        # The matrix is symmetric positive definite, so the pivots may stay on the diagonal.
-        self._factored = splu(
-            csc_array(matrix[free][:, free]),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-
-    def positions(self, time: float, anchor: Floats | None = None) -> Floats:
+    def positions(self, time: float, anchor: Floats | None = None, sweeps: int = SWEEPS) -> Floats:
         """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.
 
-        ``anchor`` (n, 3) must be the key at 0 and 1 as well; without it each component is drawn along its screw.
+        Parameters
+        ----------
+        time : float
+        anchor : (n, 3), optional
+            What vertices are drawn to, the key at 0 and 1; without it each component is drawn along its screw.
+        sweeps : int
+            How often rotations are fitted to positions and positions to rotations.
         """
-        deformation = self.deformation
-        drawn_to = self._screws.positions(time) if anchor is None else anchor[self.vertices]
-        stretch = deformation.stretch.at(time, self._law)
+        anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
+        stretch = self._moving_stretch.at(time, self._law)
+        lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
+        volumes = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
         turn_change: Floats | float = 0.0
         if self._correction is not None:
-            stretch = stretch + hermite(time, *self._correction.stretches)
-            turn_change = hermite(time, *self._correction.turns)
-        tangents = tangents_of(self.turning.at(time, turn_change), deformation.bases)
-        positions = self._solved(drawn_to, tangents, stretch, drawn_to, time)
-        for _ in range(SWEEPS - 1):
-            fitted = self._refitted(drawn_to, positions, stretch, time)
-            positions = positions + _OVER_RELAXATION * (fitted - positions)
-        positions = self._refitted(drawn_to, positions, stretch, time)
-        return self._with_volume(positions, time, _LAST_VOLUME_STEPS)[self._group]
-
-    def _refitted(self, anchor: Floats, positions: Floats, stretch: Floats, time: float) -> Floats:
-        gradients = (self._gradient @ positions).reshape(2, -1, 3)
-        return self._solved(anchor, closest_tangents(stretched(stretch, gradients)), stretch, positions, time)
-
-    def _solved(self, anchor: Floats, tangents: Floats, stretch: Floats, previous: Floats, time: float) -> Floats:
-        positions = self._key0 + time * self._travel
-        positions[self._free] = previous[self._free]
-        # Solved for the change: where the previous positions are right, needles and tiny parts do not spoil them.
-        missing = stretched(stretch, tangents).reshape(-1, 3) - self._gradient @ positions
-        load = self._divergence @ missing + self._anchor_weights[:, None] * (anchor - positions)
-        load += self._spring_load(positions, time)
-        positions[self._free] += self._factored.solve(load[self._free])
-        return self._with_volume(positions, time, 1)
-
-    def _spring_load(self, positions: Floats, time: float) -> Floats:
-        """(n, 3) forces of edges without triangles towards the interpolated length in their present direction."""
-        spans = _spans(positions, self._springs)
-        present = np.linalg.norm(spans, axis=1)
-        wanted = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
-        spans *= np.where(present > 1e-12, wanted / np.maximum(present, 1e-12) - 1.0, -1.0)[:, None]
-        return scatter(self._springs, np.stack([-spans, spans], axis=1), len(positions))
-
-    def _with_volume(self, positions: Floats, time: float, steps: int) -> Floats:
-        """Newton steps along K^-1 grad V towards the interpolated volume of every closed component."""
-        if self._closed.empty:
-            return positions
-        wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
-        if self._correction is not None:
-            wanted = wanted + hermite(time, *self._correction.volumes)
-        # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
-        most = _LARGEST_VOLUME_STEP * np.abs(wanted)
-        for _ in range(steps):
-            missing = wanted - self._closed.volumes(positions)
-            if (np.abs(missing) <= _VOLUME_TOLERANCE * np.abs(wanted)).all():
-                break
-            slope = self._closed.volume_gradient(positions)
-            direction = np.zeros_like(positions)
-            direction[self._free] = self._factored.solve(slope[self._free])
-            positions = self._closed.stepped(positions, direction, slope, np.clip(missing, -most, most))
-        return positions
+            rows = self._surface.rows
+            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
+            turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
+            volumes = volumes + hermite(time, *self._correction.volumes)
+        tangents = tangents_of(
+            self._moving_turning.at(time, turn_change), self.deformation.bases[self._surface.rows]
+        )
+        start = self._key0 + time * self._travel
+        start[self._free] = anchors[self._free]
+        wanted = Wanted(stretch, anchors, lengths[self._surface.springs], volumes)
+        return Sweeps(self._surface, start, wanted).settled(tangents, sweeps)[self._group]
 
 
 def _spans(positions: Floats, edges: Ints) -> Floats:

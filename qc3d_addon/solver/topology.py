@@ -38,8 +38,11 @@ def sides(faces: Ints) -> Ints:
 
 def unique_edges(edges: Ints) -> Ints:
     """(k, 2) edges without repetition and without loops."""
-    ordered = np.sort(edges, axis=1)
-    return np.asarray(np.unique(ordered[ordered[:, 0] != ordered[:, 1]], axis=0))
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    span = int(high.max(initial=0)) + 1
+    # One number for each edge sorts several times faster than pairs.
+    codes = np.unique((low * span + high)[low != high])
+    return np.stack([codes // span, codes % span], axis=1)
 
 
 def face_adjacency(faces: Ints) -> Ints:
@@ -64,8 +67,11 @@ def closed_faces(faces: Ints, labels: Ints) -> Bools:
     Every edge has exactly two triangles there, whose normals agree: where they do not, the signed volume means nothing.
     """
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    edges, index, uses = np.unique(sides(faces), axis=0, return_inverse=True, return_counts=True)
+    low, high = directed.min(axis=1), directed.max(axis=1)
+    edges, first, index, uses = np.unique(
+        low * (int(high.max(initial=0)) + 1) + high, return_index=True, return_inverse=True, return_counts=True
+    )
     forward = np.bincount(index.ravel(), weights=directed[:, 0] < directed[:, 1], minlength=len(edges))
     is_open = np.zeros(int(labels.max(initial=-1)) + 1, dtype=bool)
-    is_open[labels[edges[(uses != 2) | (forward != 1), 0]]] = True
+    is_open[labels[low[first[(uses != 2) | (forward != 1)]]]] = True
     return np.asarray(~is_open[labels[faces[:, 0]]])

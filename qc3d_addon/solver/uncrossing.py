@@ -22,10 +22,14 @@ class CrossingLimit:
     ----------
     faces : (m, 3) int64
     key0, key1 : (n, 3)
+    still : (n,) bool
+        Vertices that are in the same place in both keys and all shapes.
     """
 
-    def __init__(self, faces: Ints, key0: Floats, key1: Floats) -> None:
+    def __init__(self, faces: Ints, key0: Floats, key1: Floats, still: Bools) -> None:
         self._faces = faces
+        # Where neither triangle moves, nothing changes between the keys.
+        self._moving = ~still[faces].all(axis=1)
         in_keys = [self._codes(key) for key in (key0, key1)]
         self._known = np.concatenate(in_keys)
         self._allowed = max(len(codes) for codes in in_keys)
@@ -57,6 +61,6 @@ class CrossingLimit:
         return np.asarray(total / (_FADING_RINGS + 1))
 
     def _codes(self, shape: Floats) -> Ints:
-        """One number for each crossing pair of triangles."""
-        pairs = crossing_pairs(shape, self._faces)
+        """One number for each crossing pair of triangles of which one moves."""
+        pairs = crossing_pairs(shape, self._faces, self._moving)
         return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+import numpy as np
+from scipy.sparse import csr_array
 
 from .branches import Turning
+from .factorization import dissection_order, factored
 from .representation import polar_decomposition
 from .stiffness import StiffnessPattern, scatter, stiffness_elements
 from .stretch import Stretch, StretchLaw
@@ -41,24 +42,20 @@ class VolumePath:
         self._weighted_gradients = weights[:, None, None] * mesh.gradients
         matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(stiffness_elements(weights, mesh.gradients))
         self._held = mesh.on_cube_face
+        order = dissection_order(mesh.points, matrix)
         self._systems = []
         for coordinate in range(3):
-            free = ~self._held[:, coordinate]
+            held = np.flatnonzero(self._held[:, coordinate])
+            free = order[~self._held[order, coordinate]]
             rows = matrix[free]
-            factored = splu(
-                csc_array(rows[:, free]),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-            held_load = rows[:, ~free] @ mesh.points[~free, coordinate]
-            self._systems.append((free, factored, held_load))
+            held_load = rows[:, held] @ mesh.points[held, coordinate]
+            self._systems.append((free, factored(csr_array(rows[:, free])), held_load))
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
         wanted = self._turning.at(time) @ self._stretch.at(time, self._law)
         load = scatter(self._mesh.tets, self._weighted_gradients @ wanted.transpose(0, 2, 1), len(self._mesh.points))
         values = self._mesh.points.copy()
-        for coordinate, (free, factored, held_load) in enumerate(self._systems):
-            values[free, coordinate] = factored.solve(load[free, coordinate] - held_load)
+        for coordinate, (free, factors, held_load) in enumerate(self._systems):
+            values[free, coordinate] = factors.solve(load[free, coordinate] - held_load)
         return values

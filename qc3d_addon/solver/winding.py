@@ -6,14 +6,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from .parallel import in_threads
 from .surface import face_normals
 from .tetmesh import Floats, Ints
 
 OUTSIDE_WEIGHT = 1e-3
 
-_MOST_DIPOLES = 8_000
+_MOST_DIPOLES = 2_500  # groups of triangles are then about as large as the tetrahedra at the surface
 # Queries at once: few enough that their distances to all dipoles stay in the processor's cache.
-_CHUNK = 64
+_CHUNK = 128
 _ROUNDING = 1e-14  # of squared distances in the cube
 
 
@@ -39,14 +40,18 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
     # A disc of the dipole's area softens the singularity at its centre; rounding of the squares must not matter there.
     softening = np.maximum(areas / np.pi, _ROUNDING)
     moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centres)])
-    numbers = np.empty(len(queries))
-    for begin in range(0, len(queries), _CHUNK):
-        query = queries[begin : begin + _CHUNK]
-        squares = (query**2).sum(axis=1)[:, None] - 2.0 * query @ centres.T + (centres**2).sum(axis=1) + softening
-        inverse = 1.0 / (squares * np.sqrt(squares))
-        sums = inverse @ moments
-        numbers[begin : begin + _CHUNK] = sums[:, 3] - np.einsum("ij,ij->i", query, sums[:, :3])
-    return numbers / (4.0 * np.pi)
+    offsets = (centres**2).sum(axis=1) + softening
+
+    def summed(query: Floats) -> Floats:
+        squares = query @ (-2.0 * centres.T)
+        squares += (query**2).sum(axis=1)[:, None]
+        squares += offsets
+        squares *= np.sqrt(squares)
+        sums = np.reciprocal(squares, out=squares) @ moments
+        return np.asarray(sums[:, 3] - np.einsum("ij,ij->i", query, sums[:, :3]))
+
+    chunks = (queries[begin : begin + _CHUNK] for begin in range(0, len(queries), _CHUNK))
+    return np.concatenate([np.empty(0), *in_threads(summed, chunks)]) / (4.0 * np.pi)
 
 
 def insideness(numbers: Floats) -> Floats:

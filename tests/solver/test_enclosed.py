@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qc3d_addon.solver.enclosed import ClosedComponents
+from qc3d_addon.solver.enclosed import ClosedComponents, MovingVolumes
 from qc3d_addon.solver.tetmesh import Floats, Ints
 from qc3d_addon.solver.topology import sides, vertex_components
 
@@ -21,6 +21,15 @@ BALL, BALL_FACES = icosphere(1)
 
 def components_of(points: Floats, faces: Ints) -> ClosedComponents:
     return ClosedComponents(faces, vertex_components(sides(faces), len(points)))
+
+
+def moving_in(components: ClosedComponents, moving: Ints) -> MovingVolumes:
+    """All vertices are given, the moving ones first."""
+    return MovingVolumes(components, moving, order_of(len(components.labels), moving))
+
+
+def order_of(count: int, moving: Ints) -> Ints:
+    return np.concatenate([moving, np.setdiff1d(np.arange(count), moving)])
 
 
 def joined(*parts: tuple[Floats, Ints]) -> tuple[Floats, Ints]:
@@ -51,16 +60,16 @@ class TestVolumes:
     def test_only_closed_components_have_one(self) -> None:
         points, faces = joined((BOX, BOX_FACES[1:]), (BALL, BALL_FACES))
         components = components_of(np.concatenate([points, [[9.0, 9.0, 9.0]]]), faces)
-        assert not components.empty
+        assert len(components.faces) == len(BALL_FACES)
         found = components.volumes(np.concatenate([points, [[9.0, 9.0, 9.0]]]))
         assert found == pytest.approx([0.0, enclosed_volume(BALL, BALL_FACES), 0.0])
 
     @pytest.mark.parametrize("faces", [BOX_FACES[1:], BOX_FACES[:0], np.concatenate([BOX_FACES, BOX_FACES[:1]])])
     def test_none_closed(self, faces: Ints) -> None:
         components = components_of(BOX, faces)
-        assert components.empty
+        assert not len(components.faces)
         assert not components.volumes(BOX).any()
-        assert not components.volume_gradient(BOX).any()
+        assert moving_in(components, np.arange(len(BOX))).empty
 
 
 class TestGradient:
@@ -69,42 +78,61 @@ class TestGradient:
         random = np.random.default_rng(seed)
         points, faces = joined((BOX, BOX_FACES), (BALL, BALL_FACES))
         points = points + 0.1 * random.normal(size=points.shape)
-        direction = random.normal(size=points.shape)
-        direction[len(BOX) :] = 0.0
+        moving = random.permutation(len(BOX))[: random.integers(1, len(BOX) + 1)]
+        direction = np.zeros_like(points)
+        direction[moving] = random.normal(size=(len(moving), 3))
         components = components_of(points, faces)
         step = 1e-4
         ahead, behind = (components.volumes(points + sign * step * direction) for sign in (1.0, -1.0))
-        slope = (components.volume_gradient(points) * direction).sum()
+        volumes = moving_in(components, moving)
+        _, slope = volumes.with_slope(points[order_of(len(points), moving)].T)
         # The volume is cubic: what central differences miss is the third derivative.
-        np.testing.assert_allclose((ahead - behind) / (2.0 * step), [slope, 0.0], rtol=0.0, atol=1e-6)
+        found = volumes.changes(slope, direction[moving].T)
+        np.testing.assert_allclose((ahead - behind) / (2.0 * step), [found[0], 0.0], rtol=0.0, atol=1e-6)
+
+    @given(st.integers(0, 2**32 - 1))
+    def test_what_moves_and_what_rests_enclose_the_volumes_together(self, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        points, faces = joined((BOX, BOX_FACES), (BALL + 3.0, BALL_FACES))
+        moving = random.permutation(len(points))[: random.integers(1, len(points) + 1)]
+        before = points + 0.1 * random.normal(size=points.shape)
+        after = before.copy()
+        after[moving] += 0.1 * random.normal(size=(len(moving), 3))
+        components = components_of(points, faces)
+        volumes = moving_in(components, moving)
+        found = volumes.with_slope(after[order_of(len(after), moving)].T)[0] + volumes.resting(after)
+        touched = np.isin(faces, moving).any(axis=1)
+        seen = np.unique(components.labels[faces[touched, 0]])
+        np.testing.assert_allclose(found[seen], components.volumes(after)[seen], rtol=1e-11, atol=1e-12)
 
     def test_moving_everything_changes_nothing(self) -> None:
-        np.testing.assert_allclose(components_of(BOX, BOX_FACES).volume_gradient(BOX).sum(axis=0), 0.0, atol=1e-15)
+        volumes = moving_in(components_of(BOX, BOX_FACES), np.arange(len(BOX)))
+        np.testing.assert_allclose(volumes.with_slope(BOX.T)[1].sum(axis=1), 0.0, atol=1e-15)
 
 
 class TestStep:
     def test_gains_what_is_missing_in_each_component(self) -> None:
         points, faces = joined((BOX, BOX_FACES), (BALL, BALL_FACES))
-        components = components_of(points, faces)
-        missing = np.array([0.3, -0.001])
-        wanted = components.volumes(points) + missing
+        volumes = moving_in(components_of(points, faces), np.arange(len(points)))
+        shape = points.T.copy()
+        wanted = volumes.with_slope(shape)[0] + np.array([0.3, -0.001])
         for _ in range(5):
-            slope = components.volume_gradient(points)
-            points = components.stepped(points, slope, slope, wanted - components.volumes(points))
-        np.testing.assert_allclose(components.volumes(points), wanted, rtol=1e-13)
+            enclosed, slope = volumes.with_slope(shape)
+            shape = volumes.stepped(shape, slope, slope, wanted - enclosed)
+        np.testing.assert_allclose(volumes.with_slope(shape)[0], wanted, rtol=1e-13)
 
     def test_what_cannot_move_stays(self) -> None:
         points, faces = joined((BOX, BOX_FACES), (BALL, BALL_FACES))
-        components = components_of(points, faces)
-        slope = components.volume_gradient(points)
+        volumes = moving_in(components_of(points, faces), np.arange(len(points)))
+        _, slope = volumes.with_slope(points.T)
         direction = slope.copy()
-        direction[: len(BOX)] = 0.0
-        moved = components.stepped(points, direction, slope, np.array([1.0, 0.01]))
+        direction[:, : len(BOX)] = 0.0
+        moved = volumes.stepped(points.T, direction, slope, np.array([1.0, 0.01])).T
         np.testing.assert_array_equal(moved[: len(BOX)], points[: len(BOX)])
         assert np.abs(moved - points).max() > 1e-3
 
     def test_a_component_squeezed_into_a_point_stays_finite(self) -> None:
         points = np.full_like(BOX, 0.3)
-        components = components_of(points, BOX_FACES)
-        slope = components.volume_gradient(points)
-        np.testing.assert_array_equal(components.stepped(points, slope, slope, np.array([0.1])), points)
+        volumes = moving_in(components_of(points, BOX_FACES), np.arange(len(BOX)))
+        _, slope = volumes.with_slope(points.T)
+        np.testing.assert_array_equal(volumes.stepped(points.T, slope, slope, np.array([0.1])), points.T)

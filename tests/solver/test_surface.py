@@ -16,6 +16,7 @@ from qc3d_addon.solver.surface import (
     TriangleDeformation,
     closest_tangents,
     face_normals,
+    gradient_operator,
     hat_gradients,
     stretched,
     tangent_bases,
@@ -106,27 +107,32 @@ def test_triangles_without_an_area_in_either_key_are_left_out() -> None:
 
 @given(st.integers(0, 2**32 - 1))
 def test_closest_tangents_are_the_polar_factor(seed: int) -> None:
-    vectors = np.random.default_rng(seed).normal(size=(2, 30, 3))
-    left, _, right = np.linalg.svd(vectors.transpose(1, 2, 0), full_matrices=False)
-    np.testing.assert_allclose(closest_tangents(vectors).transpose(1, 2, 0), left @ right, rtol=0.0, atol=1e-9)
+    random = np.random.default_rng(seed)
+    vectors, lengths = random.normal(size=(3, 2, 30)), random.uniform(0.5, 2.0, 30)
+    left, _, right = np.linalg.svd(vectors.transpose(2, 0, 1), full_matrices=False)
+    polar = left @ right
+    np.testing.assert_allclose(closest_tangents(vectors).transpose(2, 0, 1), polar, rtol=0.0, atol=1e-9)
+    longer = closest_tangents(vectors, lengths).transpose(2, 0, 1)
+    np.testing.assert_allclose(longer, lengths[:, None, None] * polar, rtol=0.0, atol=1e-9)
 
 
 def test_closest_tangents_of_lines_and_points_are_finite() -> None:
     line = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [1e-200, 0.0, 0.0]])
-    assert np.isfinite(closest_tangents(np.stack([line, -2.0 * line]))).all()
+    assert np.isfinite(closest_tangents(np.stack([line, -2.0 * line], axis=1))).all()
 
 
 def test_tangents_of_turned_positions_are_turned_tangents() -> None:
     turn = Rotation.random(random_state=1).as_matrix()
     deformation = TriangleDeformation.between(BALL, 1.5 * BALL, FACES)
-    gradients = (deformation.gradient_operator(len(BALL)) @ (BALL @ turn.T)).reshape(2, -1, 3)
+    gradient = gradient_operator(deformation.faces, deformation.gradients, len(BALL))
+    gradients = np.stack([gradient @ row for row in turn @ BALL.T]).reshape(3, 2, -1)
     fitted = closest_tangents(stretched(deformation.stretch.at(0.3, "linear"), gradients))
     np.testing.assert_allclose(fitted, tangents_of(turn, deformation.bases), rtol=0.0, atol=1e-12)
 
 
 def test_stretched_vectors_are_products() -> None:
-    vectors = np.random.default_rng(0).normal(size=(2, 8, 3))
+    vectors = np.random.default_rng(0).normal(size=(3, 2, 8))
     stretch = np.random.default_rng(1).normal(size=(8, 2, 2))
     stretch += stretch.transpose(0, 2, 1)
-    expected = np.einsum("mij,jmk->imk", stretch, vectors)
+    expected = np.einsum("mij,kjm->kim", stretch, vectors)
     np.testing.assert_allclose(stretched(stretch, vectors), expected, rtol=0.0, atol=1e-14)

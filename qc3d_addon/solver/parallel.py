@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Independent pieces of work on all cores at once: numpy and scipy let go of the interpreter while they compute."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# Beyond this the interpreter's lock and the memory's bandwidth leave nothing to gain.
+_MOST_THREADS = 4
+
+
+def thread_count() -> int:
+    """How many pieces of work run at once: the cores that this process may use, at most four."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(cores, _MOST_THREADS)
+
+
+def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """The results of ``work`` for each item, in the order of the items; only a few are begun ahead of their turn.
+
+    Dropping the iterator ends the work after the pieces that have begun. What a piece raises is raised in its turn.
+    """
+    threads = thread_count()
+    remaining = iter(items)
+    with ThreadPoolExecutor(threads) as pool:
+        running: deque[Future[Result]] = deque()
+        try:
+            for item in remaining:
+                running.append(pool.submit(work, item))
+                if len(running) > threads:
+                    yield running.popleft().result()
+            while running:
+                yield running.popleft().result()
+        finally:
+            for future in running:
+                future.cancel()

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work in threads: results in order, nothing begun far ahead, errors in their turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count, islice
+
+import pytest
+
+from qc3d_addon.solver.parallel import in_threads, thread_count
+
+
+def test_results_come_in_the_order_of_the_items() -> None:
+    assert list(in_threads(lambda number: number**2, range(50))) == [number**2 for number in range(50)]
+
+
+def test_nothing_is_begun_far_ahead_and_dropping_ends_it() -> None:
+    begun: list[int] = []
+
+    def work(number: int) -> int:
+        begun.append(number)
+        return number
+
+    results = in_threads(work, count())
+    assert list(islice(results, 3)) == [0, 1, 2]
+    assert isinstance(results, Iterator)
+    results.close()  # type: ignore[attr-defined]
+    assert len(begun) <= 3 + thread_count() + 1
+
+
+def test_an_error_is_raised_in_its_turn() -> None:
+    def work(number: int) -> float:
+        return 1.0 / (2 - number)
+
+    results = in_threads(work, range(5))
+    assert next(results) == 0.5
+    assert next(results) == 1.0
+    with pytest.raises(ZeroDivisionError):
+        next(results)

@@ -183,16 +183,14 @@ def _projected_blocks(
     corner = terms.mixed * norm * across + terms.curvature * along * across
     bottom = terms.curvature * across**2
     top, corner, bottom = _projected_2x2(terms.linear, top, corner, bottom)
-    # Rows of the factors: gradients contracted with the two directions, (M, 4, 3).
-    one = gradients @ first.transpose(0, 2, 1)
-    two = gradients @ second.transpose(0, 2, 1)
-    laplacian = terms.linear[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
-    blocks = laplacian[:, :, :, None, None] * np.eye(3)
-    mixed_one = top[:, None, None] * one + corner[:, None, None] * two
-    mixed_two = corner[:, None, None] * one + bottom[:, None, None] * two
-    blocks += one[:, :, None, :, None] * mixed_one[:, None, :, None, :]
-    blocks += two[:, :, None, :, None] * mixed_two[:, None, :, None, :]
-    return np.asarray(volumes[:, None, None, None, None] * blocks)
+    # Rows of the factors: gradients contracted with the two directions, (M, 4, 3, 2), then mixed by the 2 x 2 part.
+    factors = np.stack([gradients @ first.transpose(0, 2, 1), gradients @ second.transpose(0, 2, 1)], axis=3)
+    mixed = volumes[:, None, None] * np.stack([top, corner, corner, bottom], axis=1).reshape(-1, 2, 2)
+    blocks = factors[:, :, None] @ (mixed[:, None] @ factors.transpose(0, 1, 3, 2))[:, None]
+    laplacian = (volumes * terms.linear)[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
+    for axis in range(3):
+        blocks[..., axis, axis] += laplacian
+    return np.asarray(blocks)
 
 
 def _projected_2x2(

@@ -124,14 +124,15 @@ class NaturalFrames:
         if guard is not None:
             positions = yield from self._kept_off(guard, times, volumes, positions)
             crossings = list(in_threads(self._limit.excess, positions))
-        made = []
-        for index, time in enumerate(times.tolist()):
-            values = volumes[index]
-            folded = self._prepared.folds(values) > 0
-            unfolded = self._prepared.unfolded(values, time) if folded else values
-            shape = self._placed(positions[index], time)
-            made.append(Frame.of(self._prepared, shape, unfolded, time, folded, crossings[index]))
-        return made
+        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
+        return list(made)
+
+    def _certified(self, moment: tuple[float, Floats, Floats, int]) -> Frame:
+        """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
+        time, values, positions, crossings = moment
+        folded = self._prepared.folds(values) > 0
+        unfolded = self._prepared.unfolded(values, time) if folded else values
+        return Frame.of(self._prepared, self._placed(positions, time), unfolded, time, folded, crossings)
 
     def _first_try(self, time: float) -> tuple[Floats, Floats, int]:
         """Values (N, 3) of the map at ``time``, the surface's cube positions (n, 3), and their excess of crossings."""

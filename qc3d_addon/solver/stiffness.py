@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
@@ -37,13 +39,17 @@ class StiffnessPattern:
 
     def assemble_blocks(self, element_blocks: Floats) -> bsr_array:
         """Sum (M, k, k, 3, 3) element matrices with 3 x 3 blocks into a (3N, 3N) matrix."""
-        blocks = element_blocks.reshape(-1, 9)
-        data = np.empty((len(self._columns), 9))
-        for entry in range(9):
-            data[:, entry] = np.bincount(self._slots, weights=blocks[:, entry], minlength=len(self._columns))
+        data = self._sums @ element_blocks.reshape(-1, 9)
         return bsr_array(
             (data.reshape(-1, 3, 3), self._columns, self._starts), shape=(3 * self.count, 3 * self.count)
         )
+
+    @cached_property
+    def _sums(self) -> csr_array:
+        """(entries, M k k): the entries of element matrices that meet in each entry of the sparse matrix."""
+        order = np.argsort(self._slots, kind="stable")
+        starts = np.concatenate([[0], np.cumsum(np.bincount(self._slots, minlength=len(self._columns)))])
+        return csr_array((np.ones(len(order)), order, starts), shape=(len(self._columns), len(order)))
 
 
 def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats | None = None) -> Floats:

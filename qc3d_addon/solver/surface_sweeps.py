@@ -196,7 +196,7 @@ class Sweeps:
         load = _applied(self._stretched_gradient.T, tangents.reshape(3, -1))[:, self._moving] + self._constant_load
         if len(self._wanted.lengths):
             load += _applied(self._surface.spans.T, self._wanted_spans())[:, self._moving]
-        return self._solved(load)
+        return self._with_volumes(self._surface.solve(load))
 
     def _corrected(self, tangents: Floats) -> Floats:
         """Positions (3, k) fitted to tangents (3, 2, m), solved for the change.
@@ -211,7 +211,7 @@ class Sweeps:
         if len(self._wanted.lengths):
             missing_spans = self._wanted_spans() - _applied(surface.spans, self._positions)
             load += _applied(surface.spans.T, missing_spans)[:, self._moving]
-        return self._solved(load, self._moved)
+        return self._moved + surface.solve(load)
 
     def _wanted_spans(self) -> Floats:
         """(3, s) the springs as long as they should be, in their present directions."""
@@ -219,23 +219,26 @@ class Sweeps:
         present = np.sqrt((spans**2).sum(axis=0))
         return np.asarray(spans * np.where(present > 1e-12, self._wanted.lengths / np.maximum(present, 1e-12), 0.0))
 
-    def _solved(self, load: Floats, origin: Floats | float = 0.0) -> Floats:
-        """Positions (3, k) from a load, ``origin`` added; to first order, every closed component has its volume."""
+    def _with_volumes(self, moved: Floats) -> Floats:
+        """Positions (3, k) moved on until, to first order, every closed component has its volume."""
         volumes = self._surface.volumes
         if volumes.empty:
-            return origin + self._surface.solve(load)
+            return moved
         enclosed, slope = volumes.with_slope(self._positions)
-        both = self._surface.solve(np.concatenate([load, slope]))
-        moved = origin + both[:3]
         missing = self._missing_volumes - enclosed - volumes.changes(slope, moved - self._moved)
-        return volumes.stepped(moved, both[3:], slope, self._limited(missing))
+        return volumes.stepped(moved, self._volume_direction, slope, self._limited(missing))
+
+    @cached_property
+    def _volume_direction(self) -> Floats:
+        """(3, k) K^-1 grad V where it is first asked for; the shape changes too little for it to be worth renewing."""
+        return self._surface.solve(self._surface.volumes.with_slope(self._positions)[1])
 
     def _limited(self, missing: Floats) -> Floats:
         # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
         return np.clip(missing, -self._largest_volume_step, self._largest_volume_step)
 
     def _restore_volumes(self) -> None:
-        """Newton steps along K^-1 grad V until every closed component has its volume."""
+        """Steps along K^-1 grad V until every closed component has its volume."""
         volumes = self._surface.volumes
         if volumes.empty:
             return
@@ -244,8 +247,7 @@ class Sweeps:
             missing = self._missing_volumes - enclosed
             if (np.abs(missing) <= _VOLUME_TOLERANCE * np.abs(self._wanted.volumes)).all():
                 break
-            direction = self._surface.solve(slope)
-            self._move(volumes.stepped(self._moved, direction, slope, self._limited(missing)))
+            self._move(volumes.stepped(self._moved, self._volume_direction, slope, self._limited(missing)))
 
 
 def _applied(matrix: csr_array | csc_array, coordinates: Floats) -> Floats:

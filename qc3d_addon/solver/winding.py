@@ -40,12 +40,11 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
     # A disc of the dipole's area softens the singularity at its centre; rounding of the squares must not matter there.
     softening = np.maximum(areas / np.pi, _ROUNDING)
     moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centres)])
-    offsets = (centres**2).sum(axis=1) + softening
+    # Squares of distances as one product, (q, |q|^2, 1) times (-2 c, 1, |c|^2 + softening).
+    dipoles = np.vstack([-2.0 * centres.T, np.ones(len(centres)), (centres**2).sum(axis=1) + softening])
 
     def summed(query: Floats) -> Floats:
-        squares = query @ (-2.0 * centres.T)
-        squares += (query**2).sum(axis=1)[:, None]
-        squares += offsets
+        squares = np.column_stack([query, (query**2).sum(axis=1), np.ones(len(query))]) @ dipoles
         squares *= np.sqrt(squares)
         sums = np.reciprocal(squares, out=squares) @ moments
         return np.asarray(sums[:, 3] - np.einsum("ij,ij->i", query, sums[:, :3]))

@@ -37,6 +37,7 @@ def main(arguments: list[str]) -> None:
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
     name = _load(package)
+    importlib.import_module(f"{name}.start").one_thread_each()
     errors = importlib.import_module(f"{name}.solver.errors")
     try:
         task = importlib.import_module(f"{name}.solver.task")

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Time the stages of one bake in a process of its own, and print them as JSON.
+
+    python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS       the stages, the warm bake, the floor of a frame
+    python -m benchmarks.stage_run CASE yardstick                fTetWild with its own defaults on the first shape
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time as clock
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from . import stage_cases
+
+_REPEATS = 5
+
+
+def main(arguments: list[str]) -> None:
+    """Print one JSON object."""
+    case, engine = arguments[:2]
+    found = yardstick(case) if engine == "yardstick" else stages(case, engine, int(arguments[2]))
+    usage = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    found |= {"peak_mb": usage[0].ru_maxrss / 1024.0, "peak_child_mb": usage[1].ru_maxrss / 1024.0}
+    found |= {"cpu": sum(part.ru_utime + part.ru_stime for part in usage)}
+    json.dump(found, sys.stdout)
+
+
+def stages(case: str, engine: str, count: int) -> dict[str, Any]:
+    """Seconds of each stage of a cold bake, of a warm one and of a second one, and the floor of a frame."""
+    started = clock.perf_counter()
+    from qc3d_addon.solver.keypair import KeyPair
+    from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
+    from qc3d_addon.solver.settings import Settings
+
+    imported = clock.perf_counter() - started
+    faces, key0, key1 = stage_cases.load(case)
+    settings = Settings(engine=engine)  # type: ignore[arg-type]
+    started = clock.perf_counter()
+    pair = KeyPair.checked(key0, key1, faces)
+    prepared = finish(prepare(pair, settings))
+    bake = finish(inbetweens(prepared, evenly_spaced(count), settings))
+    cold = clock.perf_counter() - started
+    seconds: dict[str, float] = dict(bake.report["seconds"])
+    warm = _fastest(lambda: finish(inbetweens(prepared, evenly_spaced(count), settings)), 2)
+    one = _fastest(lambda: finish(inbetweens(prepared, [0.4], settings)), 3)
+    found = {
+        "vertices": len(key0),
+        "tetrahedra": len(prepared.mesh.tets),
+        "folds": int(max(frame["folds"] for frame in bake.report["certificates"])),
+        "import": imported,
+        "cold": cold,
+        "warm": warm,
+        "one": one,
+        **{f"stage_{name}": value for name, value in seconds.items()},
+        **{f"floor_{name}": value for name, value in _floors(prepared).items()},
+        "count": count,
+    }
+    with suppress(ImportError):
+        found |= {"stage_write": _written(faces, bake.frames)}
+    return found
+
+
+def _floors(prepared: Any) -> dict[str, float]:
+    """Seconds of the back-substitutions of one frame: one of each system, and as many as its sweeps make."""
+    from qc3d_addon.solver.natural import NaturalFrames
+    from qc3d_addon.solver.surface_path import SWEEPS
+
+    maker = NaturalFrames(prepared)
+    surface, systems = maker._surface._surface, maker._volume._systems
+    load, loads = (np.ones((rows, len(surface.moving))) for rows in (3, 3 if surface.volumes.empty else 6))
+
+    def volume() -> None:
+        for free, factors, _ in systems:
+            factors.solve(np.ones(len(free)))
+
+    of_volume = _fastest(volume, _REPEATS)
+    once, swept = (_fastest(lambda loads=loads: surface.solve(loads), _REPEATS) for loads in (load, loads))
+    return {"one_of_each": of_volume + once, "with_sweeps": of_volume + (SWEEPS + 1) * swept}
+
+
+def _written(faces: stage_cases.Ints, frames: stage_cases.Floats) -> float:
+    """Seconds to put frames into a mesh as shape keys."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = bpy.data.meshes.new("Mesh")
+    mesh.from_pydata(frames[0].tolist(), [], faces.tolist())
+    obj = bpy.data.objects.new("Object", mesh)
+    obj.shape_key_add(name="Basis")
+    started = clock.perf_counter()
+    for frame in frames[1:]:
+        key = obj.shape_key_add(from_mix=False)
+        key.points.foreach_set("co", frame.astype(np.float32).ravel())
+    return clock.perf_counter() - started
+
+
+def yardstick(case: str) -> dict[str, Any]:
+    """Seconds of pytetwild.tetrahedralize with its own defaults."""
+    from unittest.mock import MagicMock
+
+    # The package imports pyvista for functions that are not used here.
+    sys.modules.setdefault("pyvista", MagicMock())
+    from pytetwild import tetrahedralize
+
+    faces, key0, _ = stage_cases.load(case)
+    started = clock.perf_counter()
+    _, tets = tetrahedralize(key0, faces.astype(np.int32))
+    return {"yardstick": clock.perf_counter() - started, "tetrahedra": len(tets)}
+
+
+def _fastest(work: Callable[[], object], repeats: int) -> float:
+    times = []
+    for _ in range(repeats):
+        started = clock.perf_counter()
+        work()
+        times.append(clock.perf_counter() - started)
+    return min(times)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

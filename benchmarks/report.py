@@ -12,8 +12,8 @@ from .catalogue import EXTRA_TURNS
 from .methods import METHODS
 from .verdict import CLASSICAL, RIVALRY, Verdict, always_measure
 
-BEGIN = "<!-- begin: written by benchmarks/inbetweens.py -->"
-END = "<!-- end: written by benchmarks/inbetweens.py -->"
+WRITER = "benchmarks/inbetweens.py"
+BEGIN, END = (f"<!-- {place}: written by {WRITER} -->" for place in ("begin", "end"))
 NAMES = {"straight": "straight", "linear": "`linear`", "natural": "`natural`", "poisson": "Poisson", "arap": "ARAP"}
 ORDER = tuple(method for method in ("straight", "linear", "poisson", "arap", "natural") if method in METHODS)
 
@@ -128,11 +128,12 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     return "\n".join(lines)
 
 
-def write_between_markers(path: Path, text: str) -> None:
-    """Replace what stands between the markers of a document."""
+def write_between_markers(path: Path, text: str, writer: str = WRITER) -> None:
+    """Replace what stands between the markers of a document that name the writer."""
+    begin, end = (marker.replace(WRITER, writer) for marker in (BEGIN, END))
     whole = path.read_text(encoding="utf-8")
-    before, found, rest = whole.partition(BEGIN)
-    _, closed, after = rest.partition(END)
+    before, found, rest = whole.partition(begin)
+    _, closed, after = rest.partition(end)
     if not found or not closed:
-        raise SystemExit(f"{path} has no lines {BEGIN!r} and {END!r} to write between.")
-    path.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+        raise SystemExit(f"{path} has no lines {begin!r} and {end!r} to write between.")
+    path.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")

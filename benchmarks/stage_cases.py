@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the stages are timed on: real pairs, and a sphere that becomes a bent limb with as many vertices as asked for."""
+"""What the stages are timed on: real pairs, and a sphere of any number of vertices that becomes a bent limb."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def load(case: str) -> tuple[Ints, Floats, Floats]:
     """Triangles, first and second shape of a case: ``body:rest:t_pose``, or ``limb:10000`` for so many vertices."""
     if case.startswith("limb:"):
         return limb(int(case.removeprefix("limb:")))
-    return Pair(*case.split(":")).load()
+    file, first, second = case.split(":")
+    return Pair(file, first, second).load()
 
 
 def limb(count: int) -> tuple[Ints, Floats, Floats]:

@@ -14,11 +14,15 @@ import sys
 import time as clock
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import stage_cases
+from .catalogue import Floats, Ints
+
+if TYPE_CHECKING:
+    from qc3d_addon.solver.prepared import PreparedMap
 
 _REPEATS = 5
 
@@ -63,30 +67,31 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
         **{f"floor_{name}": value for name, value in _floors(prepared).items()},
         "count": count,
     }
-    with suppress(ImportError):
+    with suppress(ImportError):  # without Blender's module there is nothing to write to
         found |= {"stage_write": _written(faces, bake.frames)}
     return found
 
 
-def _floors(prepared: Any) -> dict[str, float]:
+def _floors(prepared: PreparedMap) -> dict[str, float]:
     """Seconds of the back-substitutions of one frame: one of each system, and as many as its sweeps make."""
     from qc3d_addon.solver.natural import NaturalFrames
     from qc3d_addon.solver.surface_path import SWEEPS
 
     maker = NaturalFrames(prepared)
     surface, systems = maker._surface._surface, maker._volume._systems
-    load, loads = (np.ones((rows, len(surface.moving))) for rows in (3, 3 if surface.volumes.empty else 6))
+    loads = np.ones((3, len(surface.moving)))
 
     def volume() -> None:
         for free, factors, _ in systems:
             factors.solve(np.ones(len(free)))
 
-    of_volume = _fastest(volume, _REPEATS)
-    once, swept = (_fastest(lambda loads=loads: surface.solve(loads), _REPEATS) for loads in (load, loads))
-    return {"one_of_each": of_volume + once, "with_sweeps": of_volume + (SWEEPS + 1) * swept}
+    of_volume, of_surface = _fastest(volume, _REPEATS), _fastest(lambda: surface.solve(loads), _REPEATS)
+    # The sweeps, the last correction, and the direction that restores volumes.
+    swept = SWEEPS + (1 if surface.volumes.empty else 2)
+    return {"one_of_each": of_volume + of_surface, "with_sweeps": of_volume + swept * of_surface}
 
 
-def _written(faces: stage_cases.Ints, frames: stage_cases.Floats) -> float:
+def _written(faces: Ints, frames: Floats) -> float:
     """Seconds to put frames into a mesh as shape keys."""
     import bpy
 
@@ -108,11 +113,11 @@ def yardstick(case: str) -> dict[str, Any]:
 
     # The package imports pyvista for functions that are not used here.
     sys.modules.setdefault("pyvista", MagicMock())
-    from pytetwild import tetrahedralize
+    import pytetwild
 
     faces, key0, _ = stage_cases.load(case)
     started = clock.perf_counter()
-    _, tets = tetrahedralize(key0, faces.astype(np.int32))
+    _, tets = pytetwild.tetrahedralize(key0, faces.astype(np.int32))
     return {"yardstick": clock.perf_counter() - started, "tetrahedra": len(tets)}
 
 

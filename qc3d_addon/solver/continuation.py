@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from .tetmesh import Floats
 
 STEP_DEGREES = 20.0
 _STEP_ITERATIONS = 12
-_PATH_SWEEPS = 4  # the shapes on the way only lead the map; they need not have settled
+_PATH_SWEEPS = 4
 _LAST_ITERATIONS = 40
 
 
@@ -37,18 +37,34 @@ class FollowedPath:
     turns: Floats
 
 
-def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Generator[float, None, FollowedPath]:
-    """Fit the map to the second key by way of the shapes between.
+def path_to(path: SurfacePath, key1: Floats) -> Iterator[Floats]:
+    """Shapes (n, 3) on the way to the second key, in cube units, evenly spaced in time; the key itself comes last.
 
-    The number of steps follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
+    Their number follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
+    """
+    steps = step_count(path)
+    for step in range(1, steps):
+        # The shapes on the way only lead the map; they need not have settled.
+        yield path.positions(step / steps, sweeps=_PATH_SWEEPS)
+    yield key1
+
+
+def step_count(path: SurfacePath) -> int:
+    """How many steps lead to the second key."""
+    angles = np.degrees(path.turning.angles)
+    return max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
+
+
+def follow_path(fitter: FoldFreeFitter, targets: Iterable[Floats], steps: int) -> Generator[float, None, FollowedPath]:
+    """Fit the map to the second key by way of the shapes between.
 
     Parameters
     ----------
     fitter : FoldFreeFitter
-    path : SurfacePath
-        Shapes between the keys, cube units.
-    key1 : (n, 3)
-        The second key in cube units, the last target.
+    targets : iterable of (n, 3)
+        Where the landmarks should be after each step, cube units; the second key last.
+    steps : int
+        The number of targets.
 
     Yields
     ------
@@ -56,15 +72,11 @@ def follow_path(fitter: FoldFreeFitter, path: SurfacePath, key1: Floats) -> Gene
         The part that is done, 0..1.
     """
     mesh = fitter.mesh
-    angles = np.degrees(path.turning.angles)
-    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
     maps = np.empty((steps + 1, *mesh.points.shape))
     maps[0] = mesh.points
     turns = np.zeros((len(mesh.tets), 3))
-    for step in range(1, steps + 1):
-        last = step == steps
-        target = key1 if last else path.positions(step / steps, sweeps=_PATH_SWEEPS)
-        maps[step] = fitter.fit(maps[step - 1], target, _LAST_ITERATIONS if last else _STEP_ITERATIONS)
+    for step, target in enumerate(targets, start=1):
+        maps[step] = fitter.fit(maps[step - 1], target, _LAST_ITERATIONS if step == steps else _STEP_ITERATIONS)
         turns = nearest_branch(rotation_vectors(polar_decomposition(mesh.jacobians(maps[step])).rotation), turns)
         yield step / steps
     return FollowedPath(maps, turns)

@@ -47,7 +47,8 @@ class FoldFreeFitter:
         self._free = ~mesh.on_cube_face
         self._pattern = StiffnessPattern(mesh.tets, len(mesh.points))
         # Landmarks lie inside tetrahedra, so their normal matrix fits into the pattern of the mesh.
-        self._landmark_blocks = self._blocks_of(csr_array(landmarks.T @ diags_array(weights) @ landmarks))
+        self._landmark_matrix = csr_array(landmarks.T @ diags_array(weights) @ landmarks)
+        self._landmark_blocks = self._blocks_of(self._landmark_matrix)
 
     def fit(self, start: Floats, targets: Floats, most_iterations: int) -> Floats:
         """Draw the landmarks towards ``targets`` (n, 3), starting at a map without folds, ``start`` (N, 3).
@@ -55,11 +56,12 @@ class FoldFreeFitter:
         Returns the values of a map without folds. Boundary coordinates that the cube's faces hold stay as they are.
         """
         values = start
+        misfit = self.misfit(start, targets)
         for _ in range(most_iterations):
-            energy, gradient, blocks = self._model(values, targets)
+            energy, gradient, blocks = self._model(values, misfit)
             step = self._newton_step(gradient, blocks)
             slope = float((gradient * step).sum())
-            length, values = self._line_search(values, step, energy, slope, targets)
+            length, values = self._line_search(values, step, energy, slope, misfit)
             if length == 0.0 or (length == 1.0 and -slope < _RELATIVE_DECREASE * energy):
                 break
         return values
@@ -68,19 +70,23 @@ class FoldFreeFitter:
         """(n, 3) landmark positions minus targets."""
         return np.asarray(self.landmarks @ values - targets)
 
-    def _energy(self, values: Floats, targets: Floats) -> float:
+    def misfit(self, origin: Floats, targets: Floats) -> Misfit:
+        """What maps cost for missing ``targets`` (n, 3), to be asked for near the map ``origin`` (N, 3)."""
+        residuals = self.residuals(origin, targets)
+        at_origin = 0.5 * LANDMARK_WEIGHT * float(self._weights @ (residuals**2).sum(axis=1))
+        slope = LANDMARK_WEIGHT * (self.landmarks.T @ (self._weights[:, None] * residuals))
+        return Misfit(origin, at_origin, np.asarray(slope), self._landmark_matrix)
+
+    def _energy(self, values: Floats, misfit: Misfit) -> float:
         """Energy of a map, infinite where it has a fold."""
         jacobians = self.mesh.jacobians(values)
         determinant = determinants(jacobians)
         if determinant.min() <= 0.0:
             return np.inf
         density = _density(np.einsum("mij,mij->m", jacobians, jacobians), determinant)
-        return float(self.mesh.volumes @ density) + self._misfit(self.residuals(values, targets))
+        return float(self.mesh.volumes @ density) + misfit.at(values)[0]
 
-    def _misfit(self, residuals: Floats) -> float:
-        return 0.5 * LANDMARK_WEIGHT * float(self._weights @ (residuals**2).sum(axis=1))
-
-    def _model(self, values: Floats, targets: Floats) -> tuple[float, Floats, Floats]:
+    def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
         """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3)."""
         jacobians = self.mesh.jacobians(values)
         volumes, gradients = self.mesh.volumes, self.mesh.gradients
@@ -89,12 +95,11 @@ class FoldFreeFitter:
         terms = _density_derivatives(squares, determinants(jacobians))
         stress = terms.linear[:, None, None] * jacobians + terms.slope[:, None, None] * cofactor
         force = volumes[:, None, None] * (gradients @ stress.transpose(0, 2, 1))
-        residuals = self.residuals(values, targets)
-        gradient = scatter(self.mesh.tets, force, len(values))
-        gradient += LANDMARK_WEIGHT * (self.landmarks.T @ (self._weights[:, None] * residuals))
+        missed, misfit_gradient = misfit.at(values)
+        gradient = scatter(self.mesh.tets, force, len(values)) + misfit_gradient
         gradient[~self._free] = 0.0
-        energy = float(volumes @ terms.density) + self._misfit(residuals)
-        return energy, gradient, _projected_blocks(volumes, gradients, jacobians, cofactor, squares, terms)
+        blocks = _projected_blocks(volumes, gradients, jacobians, cofactor, squares, terms)
+        return float(volumes @ terms.density) + missed, gradient, blocks
 
     def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
         matrix = self._pattern.assemble_blocks(element_blocks)
@@ -116,13 +121,13 @@ class FoldFreeFitter:
         return np.asarray(step).reshape(-1, 3)
 
     def _line_search(
-        self, values: Floats, step: Floats, energy: float, slope: float, targets: Floats
+        self, values: Floats, step: Floats, energy: float, slope: float, misfit: Misfit
     ) -> tuple[float, Floats]:
         """The first of the lengths 1, 1/2, 1/4, ... that lowers the energy enough, and where it leads; 0 if none."""
         length = 1.0
         for _ in range(_BACKTRACKS):
             moved = values + length * step
-            if self._energy(moved, targets) <= energy + 1e-4 * length * slope:
+            if self._energy(moved, misfit) <= energy + 1e-4 * length * slope:
                 return length, moved
             length *= 0.5
         return 0.0, values
@@ -137,6 +142,33 @@ class FoldFreeFitter:
         places = np.searchsorted(codes, entries.row.astype(np.int64) * pattern.shape[0] + entries.col)
         values[places] = entries.data
         return np.asarray(values[:, None, None] * np.eye(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """The quadratic cost of missed landmarks, known by its value and slope at one map: no landmark is looked at again.
+
+    Parameters
+    ----------
+    origin : (N, 3)
+    at_origin : float
+    slope : (N, 3)
+        Gradient at the origin.
+    matrix : (N, N) sparse
+        The landmarks' normal matrix, weights included.
+    """
+
+    origin: Floats
+    at_origin: float
+    slope: Floats
+    matrix: csr_array
+
+    def at(self, values: Floats) -> tuple[float, Floats]:
+        """Cost and gradient (N, 3) of a map (N, 3)."""
+        change = values - self.origin
+        curved = LANDMARK_WEIGHT * (self.matrix @ change)
+        cost = self.at_origin + float((change * (self.slope + 0.5 * curved)).sum())
+        return cost, np.asarray(self.slope + curved)
 
 
 @dataclass(frozen=True)

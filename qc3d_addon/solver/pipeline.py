@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .chain import join
 from .colliders import Collider, Guard, Obstacle
-from .continuation import follow_path
+from .continuation import follow_path, path_to, step_count
 from .easing import eased
 from .embedding import Embedding
 from .errors import InputError
@@ -123,7 +123,8 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
         path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
-        followed = yield from _staged("fit", follow_path(fitter, path, embedding.key1))
+        targets = path_to(path, embedding.key1)
+        followed = yield from _staged("fit", follow_path(fitter, targets, step_count(path)))
     yield Progress("fit", 1.0)
     prepared = PreparedMap(
         pair,

@@ -50,7 +50,11 @@ def direction(seed: int) -> Floats:
 
 
 def energy(fitter: FoldFreeFitter, values: Floats, targets: Floats) -> float:
-    return fitter._energy(values, targets)
+    return fitter._energy(values, fitter.misfit(MESH.points, targets))
+
+
+def model(fitter: FoldFreeFitter, values: Floats, targets: Floats) -> tuple[float, Floats, Floats]:
+    return fitter._model(values, fitter.misfit(MESH.points, targets))
 
 
 def assert_a_map_of_the_cube(mesh: TetMesh, values: Floats) -> None:
@@ -86,7 +90,7 @@ class TestEnergy:
     @pytest.mark.parametrize("seed", range(3))
     def test_gradient_against_central_differences(self, seed: int) -> None:
         fitter, values, targets = fitter_of(), rough(seed), smooth(LANDMARKS)
-        found, gradient, _ = fitter._model(values, targets)
+        found, gradient, _ = model(fitter, values, targets)
         assert found == pytest.approx(energy(fitter, values, targets), rel=1e-13)
         for number in range(5):
             along = direction(number)
@@ -96,7 +100,7 @@ class TestEnergy:
 
     def test_gradient_vertex_by_vertex(self) -> None:
         fitter, values, targets = fitter_of(), rough(7), smooth(LANDMARKS)
-        gradient = fitter._model(values, targets)[1]
+        gradient = model(fitter, values, targets)[1]
         assert (gradient[MESH.on_cube_face] == 0.0).all()
         for vertex, axis in np.argwhere(~MESH.on_cube_face)[::37]:
             step = np.zeros_like(values)
@@ -110,7 +114,7 @@ class TestHessian:
     def test_element_blocks_are_symmetric_and_positive(self, seed: int) -> None:
         values = rough(seed) if seed else smooth(MESH.points, 0.12)
         assert_a_map_of_the_cube(MESH, values)
-        blocks = fitter_of()._model(values, LANDMARKS)[2]
+        blocks = model(fitter_of(), values, LANDMARKS)[2]
         matrices = blocks.transpose(0, 1, 3, 2, 4).reshape(-1, 12, 12)
         np.testing.assert_allclose(matrices, matrices.transpose(0, 2, 1), rtol=0.0, atol=1e-12 * np.abs(matrices).max())
         eigenvalues = np.linalg.eigvalsh(matrices)
@@ -123,7 +127,7 @@ class TestHessian:
         fitter, along = fitter_of(), direction(1)
         product = self.times(fitter, MESH.points, along)
         step = 1e-5
-        ahead, behind = (fitter._model(MESH.points + sign * step * along, LANDMARKS)[1] for sign in (1.0, -1.0))
+        ahead, behind = (model(fitter, MESH.points + sign * step * along, LANDMARKS)[1] for sign in (1.0, -1.0))
         difference = (ahead - behind) / (2.0 * step)
         free = ~MESH.on_cube_face
         np.testing.assert_allclose(product[free], difference[free], rtol=0.0, atol=1e-6 * np.abs(difference).max())
@@ -131,7 +135,7 @@ class TestHessian:
     def test_differs_from_gradient_differences_by_the_curvature_of_det_alone(self) -> None:
         fitter, values, along = fitter_of(), smooth(MESH.points, 0.03), direction(2)
         step = 1e-5
-        ahead, behind = (fitter._model(values + sign * step * along, LANDMARKS)[1] for sign in (1.0, -1.0))
+        ahead, behind = (model(fitter, values + sign * step * along, LANDMARKS)[1] for sign in (1.0, -1.0))
         jacobians, change = MESH.jacobians(values), MESH.jacobians(along)
         determinant = determinants(jacobians)
         squares = np.einsum("mij,mij->m", jacobians, jacobians)
@@ -146,7 +150,7 @@ class TestHessian:
 
     @staticmethod
     def times(fitter: FoldFreeFitter, values: Floats, along: Floats) -> Floats:
-        blocks = fitter._model(values, LANDMARKS)[2]
+        blocks = model(fitter, values, LANDMARKS)[2]
         elements = np.asarray(StiffnessPattern(MESH.tets, len(MESH.points)).assemble_blocks(blocks) @ along.ravel())
         landmarks = fitter.landmarks.T @ (fitter._weights[:, None] * (fitter.landmarks @ along))
         return np.asarray(elements.reshape(-1, 3) + LANDMARK_WEIGHT * landmarks)
@@ -207,17 +211,17 @@ class TestFit:
         for _ in range(8):
             values = fitter.fit(values, targets, 1)
             energies.append(energy(fitter, values, targets))
-        assert (np.diff(energies) <= 0.0).all()
+        assert (np.diff(energies) <= 1e-14 * energies[0]).all()  # but for rounding
         assert energies[-1] < 0.1 * energies[0]
         assert energies[-1] - energies[-2] > -1e-3 * energies[-1]
 
     def test_it_ends_where_the_gradient_vanishes(self) -> None:
         fitter, targets = fitter_of(), smooth(LANDMARKS)
-        before = np.abs(fitter._model(MESH.points, targets)[1]).max()
+        before = np.abs(model(fitter, MESH.points, targets)[1]).max()
         values = MESH.points
         for _ in range(10):
             values = fitter.fit(values, targets, 40)
-        assert np.abs(fitter._model(values, targets)[1]).max() < 1e-4 * before
+        assert np.abs(model(fitter, values, targets)[1]).max() < 1e-4 * before
 
     def test_nothing_to_do_leaves_the_identity(self, mesh: TetMesh) -> None:
         values = fitter_of(mesh).fit(mesh.points, LANDMARKS, 10)

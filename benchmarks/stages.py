@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Time every stage of a bake, each case in a process of its own.
+
+    python -m benchmarks.stages                                  # real pairs, both engines, against the yardstick
+    python -m benchmarks.stages --growth                         # the limb that a sphere becomes, 1k to 200k vertices
+    python -m benchmarks.stages --against HEAD~3 [--cases ...]   # two revisions in turn, ratios by stage
+    python -m benchmarks.stages --write                          # the tables of docs/speed.md
+
+The yardstick is the time of fTetWild with its own defaults on the same surface, in the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from .catalogue import DATA, ROOT
+from .report import table, write_between_markers
+from .stage_cases import LIMITS, SIZES
+
+DOCUMENT = ROOT / "docs/speed.md"
+STAGES = ("mesh", "locate", "fit", "factor", "frames", "measure", "write")
+_ROUNDS = 3
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", nargs="+", default=list(LIMITS), help="like body:rest:t_pose or limb:10000")
+    parser.add_argument("--engines", nargs="+", default=["delaunay", "tetwild"])
+    parser.add_argument("--frames", type=int, default=24, help="in-betweens (default: 24)")
+    parser.add_argument("--growth", action="store_true", help="the limb in all sizes, delaunay engine")
+    parser.add_argument("--against", metavar="REVISION", help="compare with another revision, alternating")
+    parser.add_argument("--write", action="store_true", help=f"put the table into {DOCUMENT.name}")
+    chosen = parser.parse_args(argv)
+    if chosen.against:
+        compare(chosen.against, chosen.cases, chosen.engines, chosen.frames)
+        return
+    text = growth(chosen.frames) if chosen.growth else pairs(chosen)
+    print(text)
+    if chosen.write:
+        write_between_markers(DOCUMENT, text, f"benchmarks/stages.py {'--growth' if chosen.growth else ''}".strip())
+
+
+def run(case: str, *arguments: object, root: Path = ROOT) -> dict[str, Any]:
+    """One measurement in a process of its own, with BLAS in one thread as in a bake."""
+    command = [sys.executable, "-m", "benchmarks.stage_run", case, *(str(argument) for argument in arguments)]
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {"PYTHONPATH": str(root), "QC3D_DATA": str(DATA)}
+    environment |= {} if "yardstick" in arguments else one_thread
+    output = subprocess.run(command, cwd=root, env=environment, check=True, capture_output=True, text=True).stdout
+    found: dict[str, Any] = json.loads(output.splitlines()[-1])
+    return found
+
+
+def pairs(chosen: argparse.Namespace) -> str:
+    """The table of real pairs."""
+    rows = []
+    for case in chosen.cases:
+        yardstick = run(case, "yardstick")["yardstick"] if case in LIMITS else None
+        for engine in chosen.engines:
+            found = run(case, engine, chosen.frames)
+            cells = [case.replace(":", " "), engine, *_stage_cells(found), f"{found['cold']:.1f}"]
+            if yardstick:
+                share, limit = found["cold"] / yardstick, LIMITS[case][engine]
+                cells += [f"{yardstick:.0f}", f"{share:.2f} (limit {limit})"]
+            else:
+                cells += ["", ""]
+            cells += [f"{found['warm']:.2f}", _times(found["warm"], found["count"] * found["floor_with_sweeps"])]
+            cells += [f"{1e3 * found['one']:.0f}", _times(found["one"], found["floor_with_sweeps"])]
+            cells += [f"{1e3 * found['floor_one_of_each']:.1f}", f"{found['peak_mb']:.0f}", str(found["folds"])]
+            rows.append(cells)
+    head = ["pair", "engine", *STAGES, "cold", "Y", "cold / Y", "warm", "/ floors", "one, ms", "/ floor"]
+    return table([*head, "one of each, ms", "MB", "folds"], rows)
+
+
+def growth(frames: int) -> str:
+    """The table of the limb in all sizes."""
+    rows = []
+    for size in SIZES:
+        found = run(f"limb:{size}", "delaunay", frames)
+        rows.append([f"{size:,}", str(found["tetrahedra"]), *_stage_cells(found), f"{found['cold']:.1f}"])
+        rows[-1] += [f"{found['peak_mb']:.0f}", str(found["folds"])]
+    return table(["vertices", "tetrahedra", *STAGES, "cold", "MB", "folds"], rows)
+
+
+def compare(revision: str, cases: list[str], engines: list[str], frames: int) -> None:
+    """Print, for each stage, the median of this revision's time over the other's, the two measured in turn."""
+    with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
+        other = Path(name) / "other"
+        subprocess.run(["git", "worktree", "add", "--detach", "--quiet", str(other), revision], cwd=ROOT, check=True)
+        try:
+            # The other revision is measured by this one's means.
+            for file in ("stage_run.py", "stage_cases.py"):
+                (other / "benchmarks" / file).write_bytes((ROOT / "benchmarks" / file).read_bytes())
+            rows = []
+            for case in cases:
+                for engine in engines:
+                    turns = [[run(case, engine, frames, root=root) for root in (ROOT, other)] for _ in range(_ROUNDS)]
+                    cells = [case, engine]
+                    for stage in ("cold", "warm", *(f"stage_{stage}" for stage in STAGES)):
+                        ratios = [ours[stage] / theirs[stage] for ours, theirs in turns if theirs.get(stage)]
+                        cells.append(f"{median(ratios):.2f}" if ratios else "")
+                    rows.append(cells)
+            print(table(["pair", "engine", "cold", "warm", *STAGES], rows))
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", str(other)], cwd=ROOT, check=True)
+
+
+def _stage_cells(found: dict[str, Any]) -> list[str]:
+    return [f"{found[f'stage_{stage}']:.2f}" if f"stage_{stage}" in found else "" for stage in STAGES]
+
+
+def _times(value: float, floor: float) -> str:
+    return f"{value / floor:.1f}×"
+
+
+if __name__ == "__main__":
+    main()

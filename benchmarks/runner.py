@@ -83,7 +83,7 @@ def arguments(argv: list[str] | None, description: str) -> argparse.Namespace:
         default=list(METHODS),
         help="measure only these (tables hold whatever is stored)",
     )
-    parser.add_argument("--engine", default="auto", help="what fills the cube for linear and natural")
+    parser.add_argument("--engine", default="delaunay", help="what fills the cube for linear and natural")
     parser.add_argument("--quality", default="normal", help="how fine, for linear and natural")
     parser.add_argument("--frames", type=int, default=3, help="in-betweens, evenly spaced (default: 3)")
     parser.add_argument("--jobs", type=int, choices=(1, 2), default=1, help="processes")

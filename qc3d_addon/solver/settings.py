@@ -37,7 +37,7 @@ class Settings:
         about its own axis. In parts that are held, any number but 0 lets what is back in its place after whole turns
         turn with the rest.
     engine
-        What fills the cube: ``tetwild``, ``delaunay``, or ``auto`` (tetwild where it can run).
+        What fills the cube: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
     quality
         How fine the volume is: ``draft``, ``normal`` or ``fine``.
     seed
@@ -50,7 +50,7 @@ class Settings:
     stretch: StretchLaw = "linear"
     easing: Easing = "linear"
     extra_turns: int = 0
-    engine: Engine = "auto"
+    engine: Engine = "delaunay"
     quality: Quality = "normal"
     seed: int = 0
     mesh_time_limit: float = 120.0

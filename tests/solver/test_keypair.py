@@ -78,7 +78,7 @@ class TestKeyPair:
 
 class TestSettings:
     def test_defaults(self) -> None:
-        assert Settings() == Settings(mode=Settings().mode, engine="auto", quality="normal", seed=0)
+        assert Settings() == Settings(mode=Settings().mode, engine="delaunay", quality="normal", seed=0)
 
     @pytest.mark.parametrize(
         ("choice", "sentence"),

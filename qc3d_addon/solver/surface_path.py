@@ -29,7 +29,7 @@ from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
-SWEEPS = 12
+SWEEPS = 13
 _LEAST_VOLUME = 1e-12
 
 

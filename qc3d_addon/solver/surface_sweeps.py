@@ -15,15 +15,16 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from .anderson import AndersonMixing
+from .chebyshev import ChebyshevIteration
 from .enclosed import ClosedComponents, MovingVolumes
 from .factorization import dissection_order, factored
 from .stiffness import StiffnessPattern, stiffness_elements
 from .surface import TriangleDeformation, closest_tangents, gradient_operator, stretched
 from .tetmesh import Bools, Floats, Ints
 
-_MEMORY = 5
-_MIXING = 1.5
+# Fixed weights: shapes have not settled fully, and what adaptive weights make of them jumps from one time to the next.
+_RADIUS = 0.95
+_RELAXATION = 1.3
 _SETTLED = 1e-10  # cube units
 _LARGEST_VOLUME_STEP = 0.1
 _LAST_VOLUME_STEPS = 12
@@ -155,13 +156,13 @@ class Sweeps:
         """(n, 3) positions after so many sweeps; the first fit is to ``tangents`` (3, 2, m)."""
         settled = self._start.copy()
         if len(self._surface.moving):
-            mixing = AndersonMixing(_MEMORY, _MIXING)
+            iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
             self._move(self._corrected(tangents))
             for _ in range(sweeps - 1):
                 present, refitted = self._moved.copy(), self._refitted()
-                if np.abs(refitted - present).max() <= _SETTLED:  # else rounding would be mixed with rounding
+                if np.abs(refitted - present).max() <= _SETTLED:  # else rounding would be amplified
                     break
-                self._move(mixing.next(present, refitted))
+                self._move(iteration.next(present, refitted))
             self._move(self._corrected(closest_tangents(self._stretched_gradients())))
             self._restore_volumes()
             settled[self._surface.moving] = self._moved.T

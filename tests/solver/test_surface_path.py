@@ -83,6 +83,13 @@ class TestEveryPair:
         # No step is much longer than the others: nothing jumps.
         assert steps.max() <= 2.0 * np.median(steps) + 1e-12
 
+    def test_nothing_jumps_in_time(self, pair: tuple[Embedding, SurfacePath]) -> None:
+        shapes = np.stack([pair[1].positions(time) for time in np.linspace(0.0, 1.0, 33)])
+        speeds = np.linalg.norm(np.diff(shapes, axis=0), axis=2).max(axis=1)
+        bends = np.linalg.norm(np.diff(shapes, 2, axis=0), axis=2).max(axis=1)
+        # A vertex that jumps by a fifth of a step would double the bend of its path there and beside it.
+        assert np.abs(np.diff(bends)).max() <= 0.1 * speeds.max() + 1e-9
+
     def test_the_same_time_gives_the_same_shape(self, pair: tuple[Embedding, SurfacePath]) -> None:
         _, path = pair
         first = path.positions(0.37)

@@ -33,6 +33,23 @@ def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
     return dense
 
 
+def missed_between(frames: Floats) -> float:
+    """About how far the straight blends of frames that follow each other are from the motion between them.
+
+    Parameters
+    ----------
+    frames : (k, n, 3)
+        Evenly spaced frames of a smooth motion; k is odd, 3 or more.
+
+    Returns
+    -------
+    float
+        In the unit of the frames: a quarter of what blends of every second frame miss, since what a straight blend
+        misses falls with the square of the step.
+    """
+    return _largest_distance(frames, 2) / 4.0
+
+
 def _largest_distance(frames: Floats, stride: int) -> float:
     """How far the straight blends of every ``stride``-th frame are from the frames between them."""
     kept = frames[::stride]

@@ -20,10 +20,10 @@ from ..solver.errors import InputError
 from . import checks, colliders, heat_map, kept_measures, mesh_data, names, shape_keys
 from .records import Chain, KeptMap, Record
 from .requests import PREVIEW_STEPS, BakeRequest, BakeResult
+from .step_choice import chosen_steps
 
 if TYPE_CHECKING:
     from ..solver.keypair import KeyPair
-    from ..solver.pipeline import Bake
     from ..solver.settings import Settings
     from ..solver.task import Outcome, Task
 
@@ -174,14 +174,14 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
-    chosen, missed = _chosen_steps(bake, request)
+    chosen, said = chosen_steps(bake, request, chain)
     intervals, times = len(chosen) - 1, bake.times[chosen]
     met, passed = _keys_on_the_way(times, request)
     shapes = shape_keys.shapes_by_step(obj, met, bake.frames[chosen])
 
     notes = shape_keys.write_chain(obj, chain, shapes, intervals, request.keyframes)
     owner = shape_keys.slider_owner(obj, chain).name
-    notes = [*bake.report["notes"], *notes, *missed, *passed, *_values_that_add(keys, request)]
+    notes = [*bake.report["notes"], *notes, *said, *passed, *_values_that_add(keys, request)]
     report = {
         "object": obj.name,
         "from": request.keys[0],
@@ -230,24 +230,6 @@ def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain
         chain = Chain(request.keys, names.chain_label(request.keys, taken))
         record.chains.append(chain)
     return chain
-
-
-def _chosen_steps(bake: Bake, request: BakeRequest) -> tuple[NDArray[np.int64], list[str]]:
-    """Which frames become shape keys: all, or as few as the tolerance allows; a sentence where all are too few."""
-    if not request.tolerance > 0.0:
-        return np.arange(len(bake.times)), []
-    from ..solver.thinning import fewest_steps, missed_between
-
-    pairs = len(request.keys) - 1
-    steps = fewest_steps(bake.frames, request.tolerance, pairs)
-    chosen = np.arange(0, len(bake.times), (len(bake.times) - 1) // (steps * pairs))
-    missed = missed_between(bake.frames) if len(chosen) == len(bake.times) else 0.0
-    if missed <= request.tolerance:
-        return chosen, []
-    return chosen, [
-        f"The most in-betweens that a tolerance makes, {steps - 1} between every two keys, miss it: vertices are up to "
-        f"about {missed:.2g} off. Choose more by their number, or a larger tolerance."
-    ]
 
 
 def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[np.int64]) -> dict[str, Any]:

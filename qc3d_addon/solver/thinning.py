@@ -9,7 +9,7 @@ import numpy as np
 from .tetmesh import Floats
 
 
-def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
+def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1, least: int = 1) -> int:
     """The fewest even steps between every two keys whose straight blends show all the frames.
 
     Parameters
@@ -20,6 +20,8 @@ def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
         How far a vertex may be from where its frame has it, in the unit of the frames.
     pairs
         Number of pairs of keys that the frames go through.
+    least
+        Smaller numbers are not looked at.
 
     Returns
     -------
@@ -27,7 +29,7 @@ def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
         A divisor of d; d itself where no smaller one is enough.
     """
     dense = (len(frames) - 1) // pairs
-    for steps in (steps for steps in range(1, dense) if dense % steps == 0):
+    for steps in (steps for steps in range(least, dense) if dense % steps == 0):
         if _largest_distance(frames, dense // steps) <= tolerance:
             return steps
     return dense

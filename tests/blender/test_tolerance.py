@@ -112,6 +112,11 @@ def turned(figure: bpy.types.Object) -> bpy.types.Object:
     return figure
 
 
+def remembered(obj: bpy.types.Object) -> Chain:
+    """What is remembered of the newest bake."""
+    return Record.read(obj.data.shape_keys).chains[-1]
+
+
 def bake_through(*names: str, **choices: object) -> Chain:
     """Bake between keys of the active object; what is remembered of it."""
     way = {"from_key": names[0], "via": [{"name": name} for name in names[1:-1]], "to_key": names[-1]}
@@ -152,3 +157,31 @@ def test_every_two_keys_of_a_chain_keep_it(turned: bpy.types.Object) -> None:
         before, part = step // stride, step % stride / stride
         blend = sparse[before] * (1.0 - part) + sparse[min(before + 1, 2 * found)] * part
         assert np.linalg.norm(blend - shape, axis=1).max() <= 0.02 + 1e-5
+
+
+@pytest.mark.usefixtures("quick_map")
+def test_baked_again_the_keys_stay_unless_more_are_needed(turned: bpy.types.Object) -> None:
+    def turn(degrees: float) -> None:
+        for point, rest in zip(turned.data.shape_keys.key_blocks["Lean"].points, turned.data.vertices, strict=True):
+            angle = np.radians(degrees) * max(rest.co.z, 0.0)
+            point.co.x = rest.co.x * np.cos(angle) - rest.co.y * np.sin(angle)
+            point.co.y = rest.co.x * np.sin(angle) + rest.co.y * np.cos(angle)
+
+    slider = "Basis→Lean"
+    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.02)
+    keys = turned.data.shape_keys.key_blocks
+    names = keys.keys()
+    turn(20.0)  # which needs fewer
+    assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
+    assert keys.keys() == names
+    assert not [note for note in remembered(turned).result["notes"] if "tolerance" in note]
+    turn(150.0)
+    assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
+    again = remembered(turned)
+    assert again.intervals > chain.intervals
+    (note,) = [note for note in again.result["notes"] if "tolerance" in note]
+    said = f"The tolerance needs {again.intervals - 1} in-betweens between every two keys now, before it were"
+    assert note == f"{said} {chain.intervals - 1}: their shape keys were replaced."
+    turn(20.0)
+    few = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.021)  # another one starts from the fewest
+    assert few.intervals < chain.intervals

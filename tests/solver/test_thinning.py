@@ -27,6 +27,11 @@ def test_chords_of_an_arc(tolerance: float, steps: int) -> None:
     assert fewest_steps(arc(48), tolerance) == steps
 
 
+@pytest.mark.parametrize(("least", "steps"), [(1, 2), (2, 2), (3, 3), (5, 6), (48, 48)])
+def test_a_smallest_number(least: int, steps: int) -> None:
+    assert fewest_steps(arc(48), 0.08, least=least) == steps
+
+
 def test_a_straight_motion_needs_no_in_between() -> None:
     frames = np.linspace(0.0, 1.0, 25)[:, None, None] * np.ones((1, 5, 3))
     assert fewest_steps(frames, 1e-12) == 1

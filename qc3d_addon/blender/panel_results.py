@@ -82,8 +82,10 @@ def _draw_chain(
     if result:
         facts = layout.column(align=True)
         facts.scale_y = 0.8
-        made = f"mirrored from {chain.mirror_of}" if chain.mirror_of else f"in {result['seconds']:.1f} s"
-        facts.label(text=f"{result['count']} in-betweens {made}")
+        if chain.mirror_of:
+            draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
+        seconds = "" if chain.mirror_of else f" in {result['seconds']:.1f} s"
+        facts.label(text=f"{result['count']} in-betweens{seconds}")
         looked_for = {name: what for name, what in _PROBLEMS.items() if result.get(name) is not None}
         problems = [f"{result[name]} {what}" for name, what in looked_for.items() if result[name]]
         facts.label(

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 import pytest
 
+from benchmarks.lid import crossings
 from qc3d_addon.blender.mesh_data import key_coordinates, triangles
-from qc3d_addon.solver.crossings import crossing_pairs
 
 FILES = {
     "limb": ("Arm", ["Basis", "Bend 90", "Twist 120", "Bend and twist"]),
@@ -73,17 +73,10 @@ def test_a_straight_blend_of_the_lid_goes_through_the_eyeball_and_ours_does_not(
     keys = ["--object", "Lid", "--from", "Basis", "--to", "Closed", "--frames", "7"]
     files = ["--output", str(tmp_path / "lid.blend"), "--report", str(report)]
     assert cli.main(["bake", str(file), *keys, "--engine", "delaunay", "--colliders", "Eyeball", *files]) == 0
-    _, positions, faces = shapes(tmp_path / "lid.blend", "Lid")
-    eyeball = bpy.data.objects["Eyeball"].data
-    points = np.array([vertex.co[:] for vertex in eyeball.vertices])
-    both = np.concatenate([faces, triangles(eyeball) + positions.shape[1]])
-
-    def crossings(shape: np.ndarray) -> int:
-        pairs = crossing_pairs(np.concatenate([shape, points]).astype(np.float64), both.astype(np.int64))
-        return int(((pairs < len(faces)).sum(axis=1) == 1).sum())
-
-    straight = [crossings((1.0 - t) * positions[0] + t * positions[1]) for t in np.linspace(0.0, 1.0, 9)]
+    _, positions, _ = shapes(tmp_path / "lid.blend", "Lid")
+    lid = bpy.data.objects["Lid"]
+    straight = crossings(lid, [(1.0 - t) * positions[0] + t * positions[1] for t in np.linspace(0.0, 1.0, 9)])
     assert straight[0] == straight[-1] == 0
     assert min(straight[2:-1]) > 50
-    assert [crossings(shape) for shape in positions] == [0] * len(positions)
+    assert crossings(lid, list(positions)) == [0] * len(positions)
     assert json.loads(report.read_text())["collider_crossings"] == [0] * 9

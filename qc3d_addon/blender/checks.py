@@ -10,7 +10,7 @@ from itertools import pairwise
 import bpy
 
 from ..solver.errors import InputError
-from .records import PROPERTY
+from .records import PROPERTY, Chain
 
 
 def object_problem(obj: bpy.types.Object | None) -> str | None:
@@ -59,6 +59,16 @@ def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
         if name == following:
             return f"'{name}' comes twice in a row; choose different keys one after the other."
     return None
+
+
+def chain_problem(keys: bpy.types.Key, chain: Chain) -> str | None:
+    """Why a chain cannot be made again, or None: the keys that it goes through are not all there."""
+    lost = next((name for name in chain.through if name not in keys.key_blocks), None)
+    if lost is None:
+        return None
+    if chain.mirror_of:
+        return f"'{chain.slider}' is the mirror image of '{chain.mirror_of}'; mirror that one again."
+    return f"Shape key '{lost}' was renamed or deleted; give it its name back to re-bake, or bake anew."
 
 
 def has_chains(keys: bpy.types.Key) -> bool:

@@ -12,9 +12,8 @@ import bpy
 
 from ..solver.errors import InputError, naming_pair
 from . import checks, mesh_data
-from .plans import kept_map
+from .plans import kept_map, request_again
 from .records import Chain, Record
-from .requests import BakeRequest
 
 if TYPE_CHECKING:
     from ..solver.map_files import KeptMaps
@@ -32,7 +31,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
 
     keys = checks.require_object(obj).data.shape_keys
     record = Record.read(keys)
-    settings = BakeRequest.again(chain.through, chain.request).settings
+    settings = request_again(obj, chain).settings
     maps = {}
     for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
         data = record.kept_map(keys, kept_map(ends, pair, settings))

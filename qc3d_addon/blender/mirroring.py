@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.errors import InputError
-from . import names, shape_keys
+from . import heat_map, kept_measures, names, shape_keys
 from .mesh_data import key_coordinates
 from .records import Chain, Record
 
@@ -22,10 +25,13 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
     Raises
     ------
     InputError
-        If the Basis is not symmetric across x = 0, or keys cannot be written; nothing was changed.
+        If the Basis is not symmetric across x = 0, the chain is a mirror image itself, the other side was baked from
+        keys of its own, or keys cannot be written; nothing was changed.
     """
     from ..solver.symmetry import mirror_partners
 
+    if chain.mirror_of:
+        raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
     keys = obj.data.shape_keys
     steps = shape_keys.owned_keys(keys, chain)
     if set(steps) != set(chain.keys):
@@ -45,11 +51,28 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
         mirrored = Chain(through, names.chain_label(through, taken))
         record.chains.append(mirrored)
+    elif mirrored.result and not mirrored.mirror_of:
+        raise InputError(
+            f"'{mirrored.slider}' was baked from keys of its own; remove it before it is made from '{chain.slider}'."
+        )
     shape_keys.require_writable(obj, mirrored, None)
     shape_keys.write_chain(obj, mirrored, shapes, chain.intervals, None)
-    mirrored.request = chain.request
+    mirrored.request, mirrored.mirror_of = chain.request, chain.slider
+    mirrored.result = _mirrored_result(chain.result, partners)
+    measures = kept_measures.read(keys, chain.slider, len(partners))
+    if measures is not None:
+        kept_measures.keep(keys, mirrored.slider, {name: values[:, partners] for name, values in measures.items()})
     record.write(keys)
+    heat_map.refresh(obj, mirrored)
     return mirrored
+
+
+def _mirrored_result(result: dict[str, Any], partners: NDArray[np.int64]) -> dict[str, Any]:
+    """What the panel shows of the mirror image: the same, at the partner of the worst place."""
+    worst = result.get("worst")
+    if not worst or not 0 <= worst["vertex"] < len(partners):
+        return dict(result)
+    return {**result, "worst": {**worst, "vertex": int(partners[worst["vertex"]])}}
 
 
 def _other_side(name: str, basis: str) -> str:

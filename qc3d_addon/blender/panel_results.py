@@ -68,15 +68,24 @@ def _draw_chain(
         layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
     else:
         layout.label(text=f"{chain.slider}: the slider was deleted", icon='ERROR')
+    problem = checks.chain_problem(obj.data.shape_keys, chain)
     buttons = layout.row(align=True)
-    buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
-    is_on = live_scrub.is_on(obj, chain.slider)
-    buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
+    if problem is not None and chain.mirror_of:  # it has no keys of its own to be made from
+        buttons.operator(QC3D_OT_mirror.bl_idname, text="Mirror Again", icon='MOD_MIRROR').slider = chain.mirror_of
+    else:
+        buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
+        is_on = live_scrub.is_on(obj, chain.slider)
+        buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
+        if problem is not None:
+            draw_sentence(context, layout, problem, 'ERROR')
     result = chain.result
     if result:
         facts = layout.column(align=True)
         facts.scale_y = 0.8
-        facts.label(text=f"{result['count']} in-betweens in {result['seconds']:.1f} s")
+        if chain.mirror_of:
+            draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
+        seconds = "" if chain.mirror_of else f" in {result['seconds']:.1f} s"
+        facts.label(text=f"{result['count']} in-betweens{seconds}")
         looked_for = {name: what for name, what in _PROBLEMS.items() if result.get(name) is not None}
         problems = [f"{result[name]} {what}" for name, what in looked_for.items() if result[name]]
         facts.label(
@@ -92,7 +101,7 @@ def _draw_chain(
     header.label(text="More")
     if more is not None:
         column = more.column(align=True)
-        for operator, icon in _MORE:
+        for operator, icon in _MORE[1:] if chain.mirror_of else _MORE:
             column.operator(operator.bl_idname, icon=icon).slider = chain.slider
 
 

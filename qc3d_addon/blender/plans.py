@@ -20,10 +20,10 @@ from ..solver.errors import InputError
 from . import checks, colliders, heat_map, kept_measures, mesh_data, names, shape_keys
 from .records import Chain, KeptMap, Record
 from .requests import PREVIEW_STEPS, BakeRequest, BakeResult
+from .step_choice import chosen_steps
 
 if TYPE_CHECKING:
     from ..solver.keypair import KeyPair
-    from ..solver.pipeline import Bake
     from ..solver.settings import Settings
     from ..solver.task import Outcome, Task
 
@@ -118,6 +118,20 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     return Plan(request, task, obj.session_uid, obj.name)
 
 
+def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
+    """What a chain was baked from, to be made again.
+
+    Raises
+    ------
+    InputError
+        If the object cannot be used, or keys that the chain goes through are not there any more.
+    """
+    problem = checks.chain_problem(checks.require_object(obj).data.shape_keys, chain)
+    if problem is not None:
+        raise InputError(problem)
+    return BakeRequest.again(chain.through, chain.request)
+
+
 def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     """Plan the frames of a baked chain as densely as a preview needs, evenly spaced before any easing.
 
@@ -126,7 +140,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     InputError
         If the object or the keys cannot be used any more.
     """
-    request = BakeRequest.again(chain.through, chain.request)
+    request = request_again(obj, chain)
     even = replace(request.settings, easing="linear")
     plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, settings=even))
     return replace(plan, request=request)
@@ -160,14 +174,14 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
-    chosen = _chosen_steps(bake, request)
+    chosen, said = chosen_steps(bake, request, chain)
     intervals, times = len(chosen) - 1, bake.times[chosen]
     met, passed = _keys_on_the_way(times, request)
     shapes = shape_keys.shapes_by_step(obj, met, bake.frames[chosen])
 
     notes = shape_keys.write_chain(obj, chain, shapes, intervals, request.keyframes)
     owner = shape_keys.slider_owner(obj, chain).name
-    notes = [*bake.report["notes"], *notes, *passed, *_values_that_add(keys, request)]
+    notes = [*bake.report["notes"], *notes, *said, *passed, *_values_that_add(keys, request)]
     report = {
         "object": obj.name,
         "from": request.keys[0],
@@ -180,7 +194,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         **bake.report,
         "notes": notes,
     }
-    chain.request = request.remembered()
+    chain.request, chain.mirror_of = request.remembered(), ""
     chain.result = _result(report, bake.times, chosen)
     measures = {name: values[chosen] for name, values in bake.measures.items()}
     kept_measures.keep(keys, chain.slider, measures)
@@ -216,17 +230,6 @@ def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain
         chain = Chain(request.keys, names.chain_label(request.keys, taken))
         record.chains.append(chain)
     return chain
-
-
-def _chosen_steps(bake: Bake, request: BakeRequest) -> NDArray[np.int64]:
-    """Which frames become shape keys: all of them, or as few as the tolerance allows."""
-    if not request.tolerance > 0.0:
-        return np.arange(len(bake.times))
-    from ..solver.thinning import fewest_steps
-
-    pairs = len(request.keys) - 1
-    steps = fewest_steps(bake.frames, request.tolerance, pairs)
-    return np.arange(0, len(bake.times), (len(bake.times) - 1) // (steps * pairs))
 
 
 def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[np.int64]) -> dict[str, Any]:

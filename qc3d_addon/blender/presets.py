@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of the panel's choices: everything but the keys and the frames, which belong to one character and shot."""
+"""Presets of the panel's choices: everything but what belongs to one character and shot."""
 
 from __future__ import annotations
 

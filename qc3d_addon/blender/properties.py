@@ -4,15 +4,19 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
+import contextlib
 from dataclasses import fields
 from typing import get_args, get_type_hints
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..solver.errors import InputError
 from ..solver.settings import OF_THE_FIT, Settings
+from . import checks, heat_map
 from .heat_colours import MEASURE_ITEMS
 from .names import MAX_STEPS
+from .records import Record
 from .requests import BakeRequest
 
 _DESCRIPTIONS = {
@@ -114,7 +118,8 @@ class BakeChoices(MapChoices):
     )
     tolerance: FloatProperty(
         name="Tolerance",
-        description="How far a vertex may be from where it should be, at any position of the slider",
+        description="How far a vertex may be from where it should be, at any position of the slider; "
+        "a length in the object's own units, before its scale",
         default=0.001,
         min=1e-6,
         soft_max=1.0,
@@ -145,10 +150,24 @@ class BakeChoices(MapChoices):
     )
 
 
+def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
+    """Let a heat map that is on show the measure that was chosen; where it cannot, its button says why."""
+    obj = settings.id_data
+    state = heat_map.shown(obj)
+    if state is None or state.measure == settings.measure or checks.object_problem(obj) is not None:
+        return
+    with contextlib.suppress(InputError):
+        chain = Record.read(obj.data.shape_keys).chain_of_slider(state.slider)
+        if chain is not None:
+            heat_map.show(obj, chain, settings.measure)
+
+
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
 
-    measure: EnumProperty(name="Measure", description="What the heat map shows", items=MEASURE_ITEMS)
+    measure: EnumProperty(
+        name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
+    )
 
 
 # Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class

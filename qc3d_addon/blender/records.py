@@ -40,6 +40,8 @@ class Chain:
         What the newest bake was asked for, as plain values; empty for those of older versions.
     result
         What the panel shows of the newest bake, as plain values.
+    mirror_of
+        Slider of the chain that this one is the mirror image of; empty where it was baked from keys of its own.
     """
 
     through: tuple[str, ...]
@@ -49,6 +51,7 @@ class Chain:
     keyframes: tuple[int, int] | None = None
     request: dict[str, Any] = field(default_factory=dict)
     result: dict[str, Any] = field(default_factory=dict)
+    mirror_of: str = ""
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,6 @@ def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> No
 
 def _no_symmetry(lost: int, count: int, axis: int) -> InputError:
     return InputError(
-        f"{lost} of {count} vertices have no mirror image across {'xyz'[axis]} = 0; the first key must be symmetric to "
+        f"{lost} of {count} vertices have no mirror image across {'xyz'[axis]} = 0; the Basis must be symmetric to "
         "mirror in-betweens."
     )

@@ -9,7 +9,7 @@ import numpy as np
 from .tetmesh import Floats
 
 
-def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
+def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1, least: int = 1) -> int:
     """The fewest even steps between every two keys whose straight blends show all the frames.
 
     Parameters
@@ -20,6 +20,8 @@ def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
         How far a vertex may be from where its frame has it, in the unit of the frames.
     pairs
         Number of pairs of keys that the frames go through.
+    least
+        Smaller numbers are not looked at.
 
     Returns
     -------
@@ -27,10 +29,27 @@ def fewest_steps(frames: Floats, tolerance: float, pairs: int = 1) -> int:
         A divisor of d; d itself where no smaller one is enough.
     """
     dense = (len(frames) - 1) // pairs
-    for steps in (steps for steps in range(1, dense) if dense % steps == 0):
+    for steps in (steps for steps in range(least, dense) if dense % steps == 0):
         if _largest_distance(frames, dense // steps) <= tolerance:
             return steps
     return dense
+
+
+def missed_between(frames: Floats) -> float:
+    """About how far the straight blends of frames that follow each other are from the motion between them.
+
+    Parameters
+    ----------
+    frames : (k, n, 3)
+        Evenly spaced frames of a smooth motion; k is odd, 3 or more.
+
+    Returns
+    -------
+    float
+        In the unit of the frames: a quarter of what blends of every second frame miss, since what a straight blend
+        misses falls with the square of the step.
+    """
+    return _largest_distance(frames, 2) / 4.0
 
 
 def _largest_distance(frames: Floats, stride: int) -> float:

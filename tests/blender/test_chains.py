@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import compat
+from qc3d_addon.blender import compat, kept_measures
 from qc3d_addon.blender.records import PROPERTY, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
@@ -242,6 +242,51 @@ class TestMirror:
         np.testing.assert_array_equal(got["Basis→Lean mirrored 2/2"], expected)
         assert bpy.ops.qc3d.remove(slider="Basis→Lean mirrored") == {"FINISHED"}
         assert [name for name in shapes(even) if "→" in name] == ["Basis→Lean 1/2", "Basis→Lean 2/2"]
+
+    def test_it_shows_the_same_result_at_the_other_side(self, even: bpy.types.Object, shown: Shown) -> None:
+        bake(count=2)
+        bpy.ops.qc3d.mirror()
+        ours, image = Record.read(even.data.shape_keys).chains
+        assert image.mirror_of == ours.slider
+        worst = [chain.result["worst"]["vertex"] for chain in (ours, image)]
+        rest = [np.array(even.data.vertices[vertex].co) for vertex in worst]
+        np.testing.assert_allclose(rest[1], rest[0] * [-1, 1, 1], atol=1e-6)
+        assert {**ours.result, "worst": None} == {**image.result, "worst": None}
+        keys, count = even.data.shape_keys, len(even.data.vertices)
+        kept = [kept_measures.read(keys, chain.slider, count) for chain in (ours, image)]
+        for name in kept_measures.MEASURES:
+            np.testing.assert_array_equal(kept[0][name][:, worst[0]], kept[1][name][:, worst[1]])
+            np.testing.assert_array_equal(np.sort(kept[0][name]), np.sort(kept[1][name]))
+        assert bpy.ops.qc3d.heat_map(slider=image.slider) == {"FINISHED"}
+        assert bpy.ops.qc3d.select_worst(slider=image.slider) == {"FINISHED"}
+
+    @pytest.mark.parametrize("name", ["rebake", "live_scrub", "save_map"])
+    def test_what_needs_keys_of_its_own(self, even: bpy.types.Object, name: str, state: State) -> None:
+        bake(count=1)
+        bpy.ops.qc3d.mirror()
+        before = state()
+        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis→Lean'; mirror that one again"):
+            getattr(bpy.ops.qc3d, name)(**({"filepath": "/none/none"} if name == "save_map" else {}))
+        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis→Lean' itself; choose that one"):
+            bpy.ops.qc3d.mirror()
+        assert state() == before
+
+    def test_keys_of_the_other_side_are_not_overwritten(self, even: bpy.types.Object, state: State) -> None:
+        even.data.shape_keys.key_blocks["Lean"].name = "Lean.L"
+        other = even.shape_key_add(name="Lean.R", from_mix=False)
+        for point in other.points:
+            point.co.x -= 0.2 * max(point.co.z, 0.0)
+        bake("Lean.L", count=1)
+        bake("Lean.R", count=1)
+        before = state()
+        with pytest.raises(RuntimeError, match=r"'Basis→Lean\.R' was baked from keys of its own; remove it before"):
+            bpy.ops.qc3d.mirror(slider="Basis→Lean.L")
+        assert state() == before
+        bpy.ops.qc3d.remove(slider="Basis→Lean.R")
+        assert bpy.ops.qc3d.mirror(slider="Basis→Lean.L") == {"FINISHED"}
+        # With a key of its own, a mirror image can be made from that one instead.
+        assert bpy.ops.qc3d.rebake(slider="Basis→Lean.R") == {"FINISHED"}
+        assert Record.read(even.data.shape_keys).chain_of_slider("Basis→Lean.R").mirror_of == ""
 
     def test_a_shape_without_symmetry(self, even: bpy.types.Object, state: State) -> None:
         for point in even.data.shape_keys.key_blocks["Basis"].points:

@@ -85,6 +85,20 @@ def test_the_colours_are_those_of_the_scale(baked: bpy.types.Object) -> None:
         np.testing.assert_allclose(colours.reshape(-1, 4)[:, channel], expected, atol=2e-3)
 
 
+def test_another_measure_is_shown_as_soon_as_it_is_chosen(baked: bpy.types.Object) -> None:
+    baked.qc3d.measure = "volume"
+    assert heat_map.shown(baked) is None  # choosing alone shows nothing
+    bpy.ops.qc3d.heat_map(measure="volume")
+    for measure in ("dilatation", "stretch"):
+        baked.qc3d.measure = measure
+        state = heat_map.shown(baked)
+        assert state is not None
+        assert state.measure == measure
+    kept_measures.forget(baked.data.shape_keys, SLIDER)
+    baked.qc3d.measure = "volume"  # which is not known any more
+    assert heat_map.shown(baked).measure == "stretch"
+
+
 def test_hidden_again_nothing_is_left(baked: bpy.types.Object, state: Callable[[], dict[str, Any]]) -> None:
     own = baked.data.color_attributes.new("Mine", "FLOAT_COLOR", "POINT")
     baked.data.color_attributes.active_color_name = own.name

@@ -42,6 +42,8 @@ def test_everything_but_the_shapes_is_kept(baked: bpy.types.Object, shapes: Read
     curve = compat.find_fcurve(baked, f'["{SLIDER}"]')
     assert curve is not None
     points = [point.co[:] for point in curve.keyframe_points]
+    animation = baked.animation_data
+    slot = (animation.action, getattr(animation, "action_slot", None))
     before = shapes(baked)
     for point in baked.data.shape_keys.key_blocks[key].points:
         point.co.y += 0.3 * point.co.z
@@ -54,6 +56,8 @@ def test_everything_but_the_shapes_is_kept(baked: bpy.types.Object, shapes: Read
     curve = compat.find_fcurve(baked, f'["{SLIDER}"]')
     assert curve is not None
     assert [point.co[:] for point in curve.keyframe_points] == points
+    assert (animation.action, getattr(animation, "action_slot", None)) == slot
+    assert baked.data.shape_keys.animation_data.action is None
     assert lamp.animation_data.drivers[0].driver.variables[0].targets[0].id == baked
 
 
@@ -97,6 +101,35 @@ def test_a_record_of_an_older_version(baked: bpy.types.Object, state: State) -> 
 def test_a_key_that_was_deleted(baked: bpy.types.Object, state: State) -> None:
     baked.data.shape_keys.key_blocks["Lean"].name = "Other"
     before = state()
-    with pytest.raises(RuntimeError, match="There is no shape key 'Lean'"):
-        bpy.ops.qc3d.rebake()
+    for again in (bpy.ops.qc3d.rebake, bpy.ops.qc3d.live_scrub):
+        with pytest.raises(RuntimeError, match="Shape key 'Lean' was renamed or deleted; give it its name back"):
+            again()
     assert state() == before
+    baked.data.shape_keys.key_blocks["Other"].name = "Lean"
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("key", ["Basis", "Lean", "Stretch"])
+def test_a_chain_again_after_any_of_its_keys_was_sculpted(
+    figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[Any], key: str
+) -> None:
+    way = {"from_key": "Basis", "via": [{"name": "Lean"}], "to_key": "Stretch"}
+    bpy.ops.qc3d.bake_inbetweens(**way, mode="linear", count=1, use_keyframes=True)
+    slider = "Basis→Lean→Stretch"
+    curve = compat.find_fcurve(figure, f'["{slider}"]')
+    assert curve is not None
+    curve.keyframe_points[1].co.x = 40.0
+    names, maps = list(shapes(figure)), len(quick_map)
+    for point in figure.data.shape_keys.key_blocks[key].points:
+        point.co.y += 0.3 * point.co.z
+    assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
+    after = shapes(figure)
+    assert list(after) == names
+    for step, own in ((2, "Lean"), (4, "Stretch")):
+        np.testing.assert_array_equal(after[f"{slider} {step}/4"], after[own])
+    assert np.abs(after[f"{slider} 1/4"] - (after["Basis"] + after["Lean"]) / 2).max() < 1e-6
+    assert np.abs(after[f"{slider} 3/4"] - (after["Lean"] + after["Stretch"]) / 2).max() < 1e-6
+    assert len(quick_map) - maps == (2 if key == "Lean" else 1)  # only pairs with a changed key
+    curve = compat.find_fcurve(figure, f'["{slider}"]')
+    assert curve is not None
+    assert curve.keyframe_points[1].co.x == 40.0

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
+from qc3d_addon.blender.records import Chain, Record
 from qc3d_addon.blender.requests import DENSE_STEPS
 
 SLIDER = "Basis→Bent"
@@ -47,6 +48,13 @@ def bake(tolerance: float) -> None:
         quality='draft',
     )  # fmt: skip
     assert found == {"FINISHED"}
+
+
+def positions(obj: bpy.types.Object, name: str) -> np.ndarray:
+    key = obj.data.shape_keys.key_blocks[name]
+    values = np.empty(3 * len(key.points), dtype=np.float32)
+    key.points.foreach_get("co", values)
+    return values.reshape(-1, 3)
 
 
 def steps(obj: bpy.types.Object) -> int:
@@ -91,3 +99,80 @@ def test_baked_again_with_the_same_tolerance(bar: bpy.types.Object) -> None:
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
     assert steps(bar) > 1
     assert SLIDER in bar
+
+
+def bend(obj: bpy.types.Object, length: float) -> None:
+    """Let the key Lean move vertices by as much as this."""
+    for point, rest in zip(obj.data.shape_keys.key_blocks["Lean"].points, obj.data.vertices, strict=True):
+        point.co.x = rest.co.x + length * max(rest.co.z, 0.0) ** 2
+
+
+def remembered(obj: bpy.types.Object) -> Chain:
+    """What is remembered of the newest bake."""
+    return Record.read(obj.data.shape_keys).chains[-1]
+
+
+def bake_through(*names: str, **choices: object) -> Chain:
+    """Bake between keys of the active object; what is remembered of it."""
+    way = {"from_key": names[0], "via": [{"name": name} for name in names[1:-1]], "to_key": names[-1]}
+    # Straight ways at a changing speed, which even steps of the slider show the better the more there are.
+    smooth = {"mode": "linear", "easing": "ease-in-out"}
+    assert bpy.ops.qc3d.bake_inbetweens(**way, **smooth, **choices) == {"FINISHED"}
+    chain = Record.read(bpy.context.active_object.data.shape_keys).chain(names)
+    assert chain is not None
+    return chain
+
+
+@pytest.mark.usefixtures("quick_map")
+def test_no_number_is_enough(figure: bpy.types.Object) -> None:
+    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=1e-5)
+    assert chain.intervals == DENSE_STEPS
+    (note,) = [note for note in chain.result["notes"] if "tolerance" in note]
+    assert note.startswith("The most in-betweens that a tolerance makes, 47 between every two keys, miss it: vertices")
+    missed = float(note.split("about ")[1].split(" off")[0])
+    chain = bake_through("Basis", "Lean", count=2 * DENSE_STEPS - 1)
+    frames = np.array([positions(figure, chain.keys[step]) for step in range(1, 2 * DENSE_STEPS)])
+    between = frames[2:-1:2] - (frames[1:-2:2] + frames[3::2]) / 2
+    assert np.linalg.norm(between, axis=2).max() == pytest.approx(missed, rel=0.2)
+
+
+@pytest.mark.usefixtures("quick_map")
+def test_every_two_keys_of_a_chain_keep_it(figure: bpy.types.Object) -> None:
+    keys = ("Lean", "Basis", "Stretch")
+    chain = bake_through(*keys, use_tolerance=True, tolerance=0.01)
+    assert not [note for note in chain.result["notes"] if "tolerance" in note]
+    found = chain.intervals // 2  # the hardest two keys decide
+    assert DENSE_STEPS % found == 0
+    assert 1 < found < DENSE_STEPS
+    sparse = {step: positions(figure, name) for step, name in chain.keys.items()}
+    sparse[found] = positions(figure, "Basis")
+    chain = bake_through(*keys, use_tolerance=False, count=DENSE_STEPS - 1)
+    dense = {step: positions(figure, name) for step, name in chain.keys.items()}
+    dense[DENSE_STEPS] = positions(figure, "Basis")
+    stride = DENSE_STEPS // found
+    for step, shape in dense.items():
+        before, part = step // stride, step % stride / stride
+        blend = sparse[before] * (1.0 - part) + sparse[min(before + 1, 2 * found)] * part
+        assert np.linalg.norm(blend - shape, axis=1).max() <= 0.01 + 1e-5
+
+
+@pytest.mark.usefixtures("quick_map")
+def test_baked_again_the_keys_stay_unless_more_are_needed(figure: bpy.types.Object) -> None:
+    slider = "Basis→Lean"
+    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.01)
+    keys = figure.data.shape_keys.key_blocks
+    names = keys.keys()
+    bend(figure, 0.1)  # which needs fewer
+    assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
+    assert keys.keys() == names
+    assert not [note for note in remembered(figure).result["notes"] if "tolerance" in note]
+    bend(figure, 3.0)
+    assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
+    again = remembered(figure)
+    assert again.intervals > chain.intervals
+    (note,) = [note for note in again.result["notes"] if "tolerance" in note]
+    said = f"The tolerance needs {again.intervals - 1} in-betweens between every two keys now, before it were"
+    assert note == f"{said} {chain.intervals - 1}: their shape keys were replaced."
+    bend(figure, 0.1)
+    few = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.011)  # another one starts from the fewest
+    assert few.intervals < chain.intervals

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.tetmesh import Floats
-from qc3d_addon.solver.thinning import fewest_steps
+from qc3d_addon.solver.thinning import fewest_steps, missed_between
 
 
 def arc(steps: int, angle: float = np.pi / 2.0) -> Floats:
@@ -27,9 +27,19 @@ def test_chords_of_an_arc(tolerance: float, steps: int) -> None:
     assert fewest_steps(arc(48), tolerance) == steps
 
 
+@pytest.mark.parametrize(("least", "steps"), [(1, 2), (2, 2), (3, 3), (5, 6), (48, 48)])
+def test_a_smallest_number(least: int, steps: int) -> None:
+    assert fewest_steps(arc(48), 0.08, least=least) == steps
+
+
 def test_a_straight_motion_needs_no_in_between() -> None:
     frames = np.linspace(0.0, 1.0, 25)[:, None, None] * np.ones((1, 5, 3))
     assert fewest_steps(frames, 1e-12) == 1
+
+
+@pytest.mark.parametrize("steps", [12, 48])
+def test_what_the_closest_chords_miss(steps: int) -> None:
+    assert missed_between(arc(steps)) == pytest.approx(1.0 - np.cos(np.pi / 4.0 / steps), rel=0.01)
 
 
 def test_the_hardest_pair_of_a_chain_decides() -> None:

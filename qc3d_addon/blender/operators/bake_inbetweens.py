@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import live_scrub
-from ..plans import Plan, plan_bake, write_bake
+from ..plans import Plan, plan_bake, request_again, write_bake
 from ..properties import BakeChoices, bake_request, fill_from_panel
-from ..requests import BakeRequest
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
 
@@ -55,7 +54,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
     def plan(self, context: bpy.types.Context) -> Plan:
         obj = context.active_object
         chain = chosen_chain(obj, self.slider)
-        return plan_bake(obj, BakeRequest.again(chain.through, chain.request))
+        return plan_bake(obj, request_again(obj, chain))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         live_scrub.end()

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel below the choices shows of each bake."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+
+from qc3d_addon.blender.panel_results import QC3D_PT_results
+
+pytestmark = pytest.mark.usefixtures("quick_map")
+
+SLIDER = "Basis→Lean.L"
+
+
+class Button:
+    """Takes the properties that a panel gives to an operator."""
+
+
+class Layout:
+    """Stands in for Blender's, which only a window has: takes note of texts, and of operators with their sliders."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+        self.buttons: list[tuple[str, Button]] = []
+
+    def label(self, text: str, **options: object) -> None:
+        self.texts.append(text)
+
+    def prop(self, data: object, name: str, **options: object) -> None:
+        self.texts.append(name)
+
+    def operator(self, name: str, **options: object) -> Button:
+        assert hasattr(bpy.ops.qc3d, name.removeprefix("qc3d."))
+        self.buttons.append((name.removeprefix("qc3d."), Button()))
+        return self.buttons[-1][1]
+
+    def panel(self, name: str, default_closed: bool) -> tuple[Layout, Layout]:
+        assert default_closed
+        return self, self
+
+    def box(self) -> Layout:
+        return self
+
+    def row(self, **options: object) -> Layout:
+        return self
+
+    column = row
+
+
+class Context:
+    """What a panel looks at, with a wide sidebar."""
+
+    class region:
+        width = 10_000
+
+    class preferences:
+        class system:
+            ui_scale = 1.0
+
+    def __init__(self, obj: bpy.types.Object) -> None:
+        self.active_object = obj
+
+
+def drawn(obj: bpy.types.Object) -> Layout:
+    class Panel:
+        layout = Layout()
+
+    assert QC3D_PT_results.poll(Context(obj))
+    QC3D_PT_results.draw(Panel(), Context(obj))
+    return Panel.layout
+
+
+@pytest.fixture
+def even() -> bpy.types.Object:
+    """The active object: a symmetric sphere with the shape keys Basis and Lean.L."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6)
+    obj = bpy.context.active_object
+    for name, lean in (("Basis", 0.0), ("Lean.L", 0.4)):
+        key = obj.shape_key_add(name=name, from_mix=False)
+        key.value = 0.0
+        for point in key.points:
+            point.co.x += lean * max(point.co.z, 0.0) ** 2
+    assert not QC3D_PT_results.poll(Context(obj))
+    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean.L", mode="linear", count=2) == {"FINISHED"}
+    return obj
+
+
+def test_a_bake(even: bpy.types.Object) -> None:
+    layout = drawn(even)
+    assert layout.texts[0] == f'["{SLIDER}"]'
+    assert [text for text in layout.texts if text.startswith("2 in-betweens in ")]
+    assert "No folds, no new crossings" in layout.texts
+    assert "Engine six" in layout.texts
+    assert [text for text in layout.texts if text.startswith("Worst stretch +")]
+    assert [text for text in layout.texts if text.startswith("Fitted within ")]
+    assert {button.slider for _, button in layout.buttons} == {SLIDER}  # type: ignore[attr-defined]
+    assert [name for name, _ in layout.buttons] == [
+        "rebake",
+        "live_scrub",
+        "select_worst",
+        "heat_map",
+        "mirror",
+        "to_keyframes",
+        "absolute_keys",
+        "export_alembic",
+        "save_map",
+        "remove",
+    ]
+
+
+def test_a_lost_key_is_said(even: bpy.types.Object) -> None:
+    even.data.shape_keys.key_blocks["Lean.L"].name = "Other"
+    sentence = "Shape key 'Lean.L' was renamed or deleted; give it its name back to re-bake, or bake anew."
+    assert sentence in drawn(even).texts
+
+
+def test_a_lost_slider_is_said(even: bpy.types.Object) -> None:
+    del even[SLIDER]
+    assert f"{SLIDER}: the slider was deleted" in drawn(even).texts
+
+
+def test_a_mirror_image_is_made_again_from_the_other_side(even: bpy.types.Object) -> None:
+    assert bpy.ops.qc3d.mirror() == {"FINISHED"}
+    layout = drawn(even)
+    assert {f"Mirrored from {SLIDER}", "2 in-betweens"} < set(layout.texts)
+    first = layout.buttons[0]  # the newest is on top
+    assert (first[0], first[1].slider) == ("mirror", SLIDER)  # type: ignore[attr-defined]
+    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis→Lean.R"]  # type: ignore[attr-defined]
+    assert "mirror" not in of_the_image
+    assert "rebake" not in of_the_image
+
+
+def test_a_damaged_record_is_said(even: bpy.types.Object) -> None:
+    even.data.shape_keys["qc3d"] = "{}"
+    assert "is damaged" in drawn(even).texts[0]

@@ -50,7 +50,7 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
         return np.asarray(sums[:, 3] - np.einsum("ij,ij->i", query, sums[:, :3]))
 
     chunks = (queries[begin : begin + _CHUNK] for begin in range(0, len(queries), _CHUNK))
-    return np.concatenate([np.empty(0), *in_threads(summed, chunks)]) / (4.0 * np.pi)
+    return np.asarray(np.concatenate([np.empty(0), *in_threads(summed, chunks)]) / (4.0 * np.pi))
 
 
 def insideness(numbers: Floats) -> Floats:

@@ -200,3 +200,13 @@ def test_one_huge_triangle_over_thousands_of_tiny_ones() -> None:
     through = np.flatnonzero((heights.min(axis=1) < 0.0) & (heights.max(axis=1) > 0.0))
     found = crossing_pairs(corners.reshape(-1, 3), triangles(len(corners)))
     np.testing.assert_array_equal(found[found[:, 1] == 20_000, 0], through)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+def test_of_moving_triangles_alone(seed: int, part: float) -> None:
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(60, 3)) * random.choice([0.05, 1.0], size=(60, 1))
+    faces = random.permuted(np.tile(np.arange(60), (25, 1)), axis=1)[:, :3]
+    moving = random.random(25) < part
+    everything = crossing_pairs(points, faces)
+    np.testing.assert_array_equal(crossing_pairs(points, faces, moving), everything[moving[everything].any(axis=1)])

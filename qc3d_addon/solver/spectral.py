@@ -55,7 +55,8 @@ class Transfer:
     def vertex_volumes(self) -> Floats:
         """(N,) a quarter of the volume of the tetrahedra around each vertex."""
         mesh = self._mesh
-        return np.bincount(mesh.tets.ravel(), weights=np.repeat(mesh.volumes / 4.0, 4), minlength=len(mesh.points))
+        weights = np.repeat(mesh.volumes / 4.0, 4)
+        return np.asarray(np.bincount(mesh.tets.ravel(), weights, len(mesh.points)), dtype=np.float64)
 
     @cached_property
     def to_vertices(self) -> csr_array:

@@ -137,8 +137,8 @@ def read_compressed(path: Path, mesh: TetMesh) -> CompressedMaps:
 
 def digest(mesh: TetMesh) -> bytes:
     """32 bytes that tell meshes apart."""
-    found = hashlib.sha256(np.ascontiguousarray(mesh.points, dtype="<f8"))
-    found.update(np.ascontiguousarray(mesh.tets, dtype="<i8"))
+    found = hashlib.sha256(np.ascontiguousarray(mesh.points, dtype="<f8").tobytes())
+    found.update(np.ascontiguousarray(mesh.tets, dtype="<i8").tobytes())
     return found.digest()
 
 

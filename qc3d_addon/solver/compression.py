@@ -20,6 +20,7 @@ The boundary is not stored where it slides: the conditions of the rebuilding giv
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -41,6 +42,8 @@ Boundary = Literal["sliding", "fixed"]
 _NORM = np.sqrt(np.array([1.0, 2.0, 2.0, 1.0, 2.0, 1.0]))
 # Coefficients beyond so many steps do not fit the format; a step that makes larger ones is too small to be of use.
 MOST_STEPS = 2**40
+# No real map stretches by more than exp of this, about 20,000; beyond it rounding could spoil definiteness.
+_MOST_LOGARITHM = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +98,21 @@ class Codec:
         self._transfer = Transfer(mesh)
         self._at_tets = np.asarray(self._transfer.to_tets @ self.spectrum.modes)
 
+    def with_scheme(self, scheme: Scheme) -> Codec:
+        """The same modes for another scheme."""
+        other = copy.copy(self)
+        other.scheme = scheme
+        return other
+
     def coefficients(self, mapping: Mapping, modes: int) -> Floats:
         """(k, 6) coefficients of the representation in the first modes, off-diagonal channels times the root of two."""
         stretch = mapping.stretch if self.scheme == "published" else _logarithm(mapping.stretch)
         channels = upper_triangle(stretch) * _NORM
         if self.scheme == "fitted":
             basis, weights = self._at_tets[:, :modes], self.mesh.volumes[:, None]
-            return np.linalg.solve(basis.T @ (weights * basis), basis.T @ (weights * channels))
+            return np.asarray(np.linalg.solve(basis.T @ (weights * basis), basis.T @ (weights * channels)))
         weighted = self._transfer.vertex_volumes[:, None] * (self._transfer.to_vertices @ channels)
-        return np.asarray(self.spectrum.modes[:, :modes].T @ weighted)
+        return np.asarray(self.spectrum.modes[:, :modes].T @ weighted, dtype=np.float64)
 
     def steps(self, modes: int) -> Floats:
         """(k,) how much coarser each mode may be rounded than the lowest."""
@@ -111,7 +120,7 @@ class Codec:
             return np.ones(modes)
         eigenvalues = self.spectrum.eigenvalues[:modes]
         lowest = self.spectrum.eigenvalues[1] if len(self.spectrum.eigenvalues) > 1 else 1.0
-        return np.sqrt(1.0 + eigenvalues / lowest)
+        return np.asarray(np.sqrt(1.0 + eigenvalues / lowest))
 
     def compress(self, mapping: Mapping, modes: int, step: float) -> Compressed:
         """Round the coefficients of the first modes to multiples of a step.
@@ -204,5 +213,6 @@ def _logarithm(stretch: Floats) -> Floats:
 
 def _exponential(matrices: Floats) -> Floats:
     values, vectors = np.linalg.eigh(matrices)
-    product = (vectors * np.exp(np.clip(values, -50.0, 50.0))[:, None]) @ vectors.transpose(0, 2, 1)
+    stretches = np.exp(np.clip(values, -_MOST_LOGARITHM, _MOST_LOGARITHM))
+    product = (vectors * stretches[:, None]) @ vectors.transpose(0, 2, 1)
     return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 
-_LZMA = [{"id": lzma.FILTER_LZMA2, "preset": 9}]
+_LZMA = [{"id": lzma.FILTER_LZMA2, "preset": 9, "dict_size": 1 << 20}]
 _RAW_LZMA, _DEFLATE = b"L", b"Z"
 
 

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``qc3d compress`` and ``qc3d decompress``, end to end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from qc3d_addon import cli
+from qc3d_addon.experiments import shapes
+from qc3d_addon.solver.mapping_files import TARGET, TetFile, read_tets, write_tets
+from qc3d_addon.solver.meshing import fill_cube
+from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.tetmesh import TetMesh
+
+
+@pytest.fixture(scope="module")
+def mesh() -> TetMesh:
+    return fill_cube(*shapes._ball(6), Settings(engine="delaunay", quality="draft")).mesh
+
+
+@pytest.fixture
+def source(mesh: TetMesh, tmp_path: Path) -> Path:
+    values = mesh.points + 0.5 * (shapes.sliding(mesh.points) - mesh.points)
+    write_tets(tmp_path / "map.npz", TetFile(mesh.points, mesh.tets, {TARGET: values}))
+    return tmp_path / "map.npz"
+
+
+@pytest.mark.parametrize("amount", [["--modes", "20"], ["--error", "0.001"], ["--size", "1500"]])
+@pytest.mark.parametrize("scheme", ["published", "fitted"])
+def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme: str) -> None:
+    file, report, output = tmp_path / "map.qc3d", tmp_path / "report.json", tmp_path / "restored.npz"
+    files = ["--output", str(file), "--report", str(report)]
+    command = ["compress", str(source), *amount, "--scheme", scheme, *files]
+    if scheme == "published" and amount[0] == "--error":
+        command[3] = "0.02"
+    assert cli.main(command) == 0
+    assert cli.main(["decompress", str(file), str(source), "--output", str(output)]) == 0
+    told = json.loads(report.read_text())
+    before, after = read_tets(source).mapping(), read_tets(output).mapping()
+    error = np.sqrt(((after.values - before.values) ** 2).sum(axis=1).mean()) / np.sqrt(3.0)
+    assert told["error"] == [pytest.approx(error, rel=1e-6)]
+    assert told["bytes"] == file.stat().st_size
+    assert told["boundary_error"] == [0.0]
+    assert told["folds"] == [after.folds] == [0]
+    assert told["raw_bytes"] == 12 * len(before.mesh.points)
+
+
+def test_many_frames(mesh: TetMesh, tmp_path: Path) -> None:
+    moved = shapes.sliding(mesh.points) - mesh.points
+    frames = np.stack([mesh.points + part * moved for part in (0.1, 0.3, 0.5)], axis=1)
+    write_tets(tmp_path / "frames.npz", TetFile(mesh.points, mesh.tets, {TARGET: frames}))
+    arguments = ["--error", "1e-4", "--output", str(tmp_path / "frames.qc3d")]
+    assert cli.main(["compress", str(tmp_path / "frames.npz"), *arguments]) == 0
+    output = tmp_path / "restored.npz"
+    assert (
+        cli.main(["decompress", str(tmp_path / "frames.qc3d"), str(tmp_path / "frames.npz"), "--output", str(output)])
+        == 0
+    )
+    restored = read_tets(output).at_vertices[TARGET]
+    assert restored.shape == frames.shape
+    assert np.sqrt(((restored - frames) ** 2).sum(axis=2).mean(axis=0)).max() <= 1e-4 * np.sqrt(3.0)
+
+
+class TestErrors:
+    def said(self, capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+        assert cli.main([str(argument) for argument in arguments]) == 2
+        return capsys.readouterr().err
+
+    def test_no_amount(self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        said = self.said(capsys, "compress", source, "--output", tmp_path / "a.qc3d")
+        assert "--modes --error --size is required" in said
+
+    @pytest.mark.parametrize("error", ["0", "-1", "nan", "inf"])
+    def test_errors_that_are_none(
+        self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], error: str
+    ) -> None:
+        said = self.said(capsys, "compress", source, "--error", error, "--output", tmp_path / "a.qc3d")
+        assert "is not possible" in said
+        assert not (tmp_path / "a.qc3d").exists()
+
+    def test_another_mesh(self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert cli.main(["compress", str(source), "--modes", "5", "--output", str(tmp_path / "a.qc3d")]) == 0
+        content = read_tets(source)
+        write_tets(tmp_path / "other.npz", TetFile(content.points + 1.0, content.tets))
+        said = self.said(
+            capsys, "decompress", tmp_path / "a.qc3d", tmp_path / "other.npz", "--output", tmp_path / "o.npz"
+        )
+        assert "another mesh" in said

@@ -22,6 +22,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarse volumes and few modes."""
     monkeypatch.setattr(shapes, "SETTINGS", shapes.Settings(engine="delaunay", quality="draft"))
     monkeypatch.setattr(spectra, "_MODES", 60)
+    monkeypatch.setattr(spectra, "_FITTED_COUNTS", (4, 16))
     reproduce._cube.cache_clear()
     reproduce._experiment.cache_clear()
 

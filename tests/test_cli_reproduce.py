@@ -64,7 +64,7 @@ def test_captions_say_no_where_it_does_not_hold(tmp_path: Path, monkeypatch: pyt
         return Mapping(mesh, mesh.points + 1e-3)
 
     monkeypatch.setattr(bijections, "reconstruct", rebuilt)
-    caption = bijections.draw("3", mesh, tmp_path / "figure.png")
+    caption = bijections.draw("3", "a map", Mapping(mesh, mesh.points), tmp_path / "figure.png")
     assert isinstance(caption, Caption)
     assert caption.holds.startswith("No")
 

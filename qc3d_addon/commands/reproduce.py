@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..solver.array_files import replacing
 from ..solver.errors import InputError
+from ..solver.mapping import Mapping
 
 if TYPE_CHECKING:
     from ..experiments.caption import Caption
@@ -56,13 +57,25 @@ def _draw(number: int, data: Path | None, path: Path) -> Caption:
     from ..experiments import bijections, sequences, shapes, spectra
 
     if number <= 5:
-        return bijections.draw(str(number), _cube(), path)
+        return bijections.draw(str(number), *_bijection(str(number), data), path)
     if number <= 7:
         known = {6: (shapes.FACES, shapes.DATA_FACES), 7: (shapes.BODIES, shapes.DATA_BODIES)}
         return sequences.draw(str(number), known[number][data is not None], data, path)
     which, kind = divmod(number - 8, 3)
     draw = (spectra.draw_cubes, spectra.draw_spectrum, spectra.draw_errors)[kind]
     return draw(str(number), _experiment(which, data), path)
+
+
+def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:
+    """What a figure is called and the map it rebuilds: from a formula, or one fitted to real shapes."""
+    from ..experiments import bijections, shapes
+
+    if data is None:
+        title, formula = bijections.BIJECTIONS[number]
+        return title, bijections.without_folds(_cube(), formula)
+    pose = (shapes.DATA_FACES[1], shapes.DATA_BODIES[0], shapes.DATA_BODIES[2])[int(number) - 3]
+    prepared = shapes.fitted(shapes.read(pose, data))
+    return f"the map of {pose.label}", Mapping(prepared.mesh, prepared.mapped)
 
 
 @cache

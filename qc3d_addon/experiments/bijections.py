@@ -33,19 +33,16 @@ _CLAIM = "A bijection of the cube is rebuilt from its representation with an err
 _EXACT = 1e-9
 
 
-def draw(number: str, mesh: TetMesh, path: Path) -> Caption:
+def draw(number: str, title: str, mapping: Mapping, path: Path) -> Caption:
     """Draw one of the figures: the map on the cube's faces, a slice of it, and the error of its rebuilding."""
-    title, bijection = BIJECTIONS[number]
-    mapping = without_folds(mesh, bijection)
+    mesh = mapping.mesh
     rebuilt = reconstruct(mesh, mapping.stretch, Conditions.sliding_cube(mesh))
     error = np.linalg.norm(rebuilt.values - mapping.values, axis=1)
-    figure, panels = pyplot.subplots(1, 4, figsize=(16, 4.4), layout="constrained")
-    for axes, values, label in (
-        (panels[0], mesh.points, "the cube"),
-        (panels[1], rebuilt.values, "rebuilt from the representation"),
-    ):
-        draw_cube(axes, mesh, values)
-        axes.set_title(label)
+    figure, panels = pyplot.subplots(1, 4, figsize=(16, 4.2), layout="constrained")
+    draw_cube(panels[0], mesh, mesh.points)
+    panels[0].set_title("the cube")
+    draw_cube(panels[1], mesh, rebuilt.values)
+    panels[1].set_title("rebuilt from the representation")
     _draw_slice(panels[2], mapping, rebuilt)
     panels[3].hist(np.log10(np.maximum(error, 1e-17)), 40, color="0.4")
     panels[3].set_xlabel("log₁₀ of a vertex's error")
@@ -82,4 +79,4 @@ def _draw_slice(axes: Axes, mapping: Mapping, rebuilt: Mapping) -> None:
     axes.add_collection(drawn)
     axes.set_aspect("equal")
     axes.autoscale()
-    axes.set_title("z = ½ of the rebuilt map; colour: log₂ of the volume ratio")
+    axes.set_title("slice z = ½; log₂ of the volume ratio, −2 … 2")

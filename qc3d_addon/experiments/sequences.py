@@ -44,8 +44,8 @@ def draw(number: str, poses: tuple[Pose, ...], data: Path | None, path: Path) ->
             f"{pose.label}: worst edge beyond its lengths in the keys, straight blend {excess[0]:.1%}, linear "
             f"{excess[1]:.1%}, natural {excess[2]:.1%}; folded tetrahedra in the frames of linear {folds}"
         )
-        rows += [_upright(row, pose) for row in found]
-    save_sheet(rows, "auto", 150, path)
+        rows += [_upright(row, pose)._replace(label=f"{pose.second}\n{row.label}") for row in found]
+    save_sheet(rows, "three-quarter" if number == "6" else "auto", 150, path)
     worst = np.max(excesses, axis=0)
     if worst[1] < _MILD and not folded:
         holds = "Yes."

@@ -29,6 +29,7 @@ _MODES = 400
 _SHOWN = 60  # modes in the pictures of the cube
 _COUNTS = (1, 2, 4, 8, 16, 30, 60, 120, 240, 400)
 _FITTED_COUNTS = (4, 16, 60, 240)  # each is a search
+_WINDOW = 15
 _CHANNELS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _EXACTLY = 1e-9  # a step so small that nothing is rounded
 _LINES = {"coordinates": "k--o", "published": "C1-o", "logarithm": "C0-o", "fitted": "C2-s"}
@@ -104,14 +105,15 @@ def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
     coordinates = experiment.coordinates(modes)
     restored = experiment.restored("logarithm", modes)
     assert restored is not None
-    figure, panels = pyplot.subplots(1, 3, figsize=(13, 4.8), layout="constrained")
-    for axes, values, title in (
-        (panels[0], mapping.values, "the map"),
-        (panels[1], coordinates, f"coordinates, {modes} modes"),
-        (panels[2], restored.values, f"representation, {modes} modes"),
+    figure, panels = pyplot.subplots(2, 3, figsize=(11, 7.4), layout="constrained")
+    for column, values, title in (
+        (panels[:, 0], mapping.values, "the map"),
+        (panels[:, 1], coordinates, f"coordinates, {modes} modes"),
+        (panels[:, 2], restored.values, f"representation (log P), {modes} modes"),
     ):
-        draw_cube(axes, mesh, values)
-        axes.set_title(title)
+        draw_cube(column[0], mesh, values)
+        draw_cube(column[1], mesh, values, behind=True)
+        column[0].set_title(title)
     figure.savefig(path, dpi=100)
     pyplot.close(figure)
     held = mesh.on_cube_face
@@ -131,12 +133,18 @@ def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
 def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
     """Size of the six channels' coefficients, by mode."""
     coefficients = np.abs(experiment.codecs["published"].projected(experiment.mapping, experiment.modes))
-    figure, axes = pyplot.subplots(figsize=(9, 4.5), layout="constrained")
-    for name, channel in zip(_CHANNELS, coefficients.T, strict=True):
-        axes.semilogy(np.arange(1, len(channel) + 1), np.maximum(channel, 1e-12), linewidth=0.7, label=name)
-    axes.set_xlabel("mode")
-    axes.set_ylabel("size of the coefficient")
-    axes.legend(ncols=6)
+    figure, panels = pyplot.subplots(2, 3, figsize=(11, 5.4), sharex=True, sharey=True, layout="constrained")
+    window = np.ones(_WINDOW)
+    for axes, name, channel in zip(panels.ravel(), _CHANNELS, coefficients.T, strict=True):
+        modes = np.arange(1, len(channel) + 1)
+        axes.semilogy(modes, np.maximum(channel, 1e-12), ".", markersize=2.5, color="0.6")
+        inner = channel[1:]  # the constant mode, which holds the identity, is a point by itself
+        mean = np.sqrt(np.convolve(inner**2, window, "same") / np.convolve(np.ones_like(inner), window, "same"))
+        axes.semilogy(modes[1:], np.maximum(mean, 1e-12), color="C0", linewidth=1.5)
+        axes.set_title(name, fontsize=10)
+        axes.set_ylim(max(coefficients[1:].max() * 1e-4, 1e-12), max(coefficients.max() * 2.0, 1e-11))
+    figure.supxlabel("mode")
+    figure.supylabel(f"size of the coefficient; blue: root mean square of {_WINDOW}")
     figure.savefig(path, dpi=100)
     pyplot.close(figure)
     # Without the constant mode, which holds the identity.
@@ -196,8 +204,8 @@ def draw_errors(number: str, experiment: Experiment, path: Path) -> Caption:
         "The error is flat until few modes are left.",
         f"of the mean square error between source and target there is left: {told}{without}. The transfer between "
         f"tetrahedra and vertices alone, all modes kept, leaves {transfers[0]:.2%} (published), {transfers[1]:.2%} "
-        f"(logarithm), {transfers[2]:.2%} (fitted: nearest vertex values). From {every[-1]} to {few} modes the published "
-        f"scheme's error grows by a factor of {growth:.2g}.",
+        f"(logarithm), {transfers[2]:.2%} (fitted: nearest vertex values). From {every[-1]} to {few} modes the "
+        f"published scheme's error grows by a factor of {growth:.2g}.",
         "Yes." if growth < 1.1 else "In part: it grows slowly." if growth < 2.0 else "No: it grows all the way.",
     )
 

@@ -132,7 +132,8 @@ def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
 
 def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
     """Size of the six channels' coefficients, by mode."""
-    coefficients = np.abs(experiment.codecs["published"].projected(experiment.mapping, experiment.modes))
+    codec, mesh = experiment.codecs["published"], experiment.mapping.mesh
+    coefficients = np.abs(codec.projected(experiment.mapping, experiment.modes))
     figure, panels = pyplot.subplots(2, 3, figsize=(11, 5.4), sharex=True, sharey=True, layout="constrained")
     window = np.ones(_WINDOW)
     for axes, name, channel in zip(panels.ravel(), _CHANNELS, coefficients.T, strict=True):
@@ -151,17 +152,17 @@ def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
     energy = (coefficients[1:] ** 2).sum(axis=1)
     tenth = max(1, len(energy) // 10)
     share = float(energy[:tenth].sum() / energy.sum())
-    mesh, transfer = experiment.mapping.mesh, Transfer(experiment.mapping.mesh)
-    stretch = experiment.mapping.stretch - np.eye(3)
-    at_vertices = transfer.to_vertices @ stretch.reshape(-1, 9)
-    caught = (coefficients**2).sum() - 3.0 * mesh.volumes.sum()
+    transfer = Transfer(mesh)
+    at_vertices = transfer.to_vertices @ (experiment.mapping.stretch - np.eye(3)).reshape(-1, 9)
     every = float((transfer.vertex_volumes[:, None] * at_vertices**2).sum())
+    identity = codec.projected(Mapping(mesh, mesh.points), experiment.modes)
+    caught = float(((codec.projected(experiment.mapping, experiment.modes) - identity) ** 2).sum()) / every
     return Caption(
         number,
         f"{experiment.pose.label}: spectra of the six channels",
         "The spectra are concentrated at low frequencies.",
         f"of the energy in {experiment.modes} modes, the constant one left out, the lowest tenth has {share:.0%}; all "
-        f"of them have about {min(max(caught / every, 0.0), 1.0):.0%} of what the vertices have of P − I.",
+        f"of them have {caught:.0%} of what the vertices have of P − I.",
         "Yes."
         if share > 0.8
         else "In part: low modes are larger, but much is spread over the others."

@@ -129,6 +129,15 @@ class TestErrors:
         assert "is not possible" in said
         assert not (tmp_path / "a.qc3d").exists()
 
+    def test_the_report_is_another_file(
+        self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        outputs = ("--output", tmp_path / "a", "--report", tmp_path / "a")
+        assert "named twice" in self.said(capsys, "compress", source, "--modes", 2, *outputs)
+        outputs = ("--output", tmp_path / "a", "--report", tmp_path / "none" / "r.json")
+        assert "none" in self.said(capsys, "compress", source, "--modes", 2, *outputs)
+        assert not (tmp_path / "a").exists()
+
     def test_frames_take_no_other_scheme(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         points, faces = shapes._ball(4)
         np.savez(tmp_path / "frames.npz", frames=np.stack([points, 2.0 * points]), faces=faces, key0=points)

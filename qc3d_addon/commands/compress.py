@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -67,19 +68,19 @@ class _Job(NamedTuple):
 def _compress(arguments: argparse.Namespace) -> None:
     if arguments.error is not None and not 0.0 < arguments.error < np.inf:
         raise InputError(f"The error {arguments.error} is not possible; give a number above 0.")
-    job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
-    if arguments.modes is not None:
-        choice = job.compressor.with_modes(job.compressor.codec.modes)
-    elif arguments.error is not None:
-        choice = job.compressor.with_error(arguments.error)
-    else:
-        choice = job.compressor.with_size(arguments.size)
-    data = job.packer.bytes_of(choice.compressed)
-    report = _report(job.compressor, choice, len(data))
-    write_compressed(arguments.output, data)
-    if arguments.report is not None:
-        with replacing(arguments.report) as unfinished:
-            unfinished.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    if arguments.report is not None and arguments.report.resolve() == arguments.output.resolve():
+        raise InputError(f"{arguments.report} is named twice; output and report must be different files.")
+    with ExitStack() as stack:
+        # Whether the places can be written is known before the work.
+        output = stack.enter_context(replacing(arguments.output))
+        report_file = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
+        job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
+        choice = _chosen(job.compressor, arguments)
+        data = job.packer.bytes_of(choice.compressed)
+        report = _report(job.compressor, choice, len(data))
+        write_compressed(output, data)
+        if report_file is not None:
+            report_file.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(
         f"{len(data)} bytes, 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
         f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {choice.error:.2g}, folds "
@@ -87,13 +88,25 @@ def _compress(arguments: argparse.Namespace) -> None:
     )
 
 
+def _chosen(compressor: Compressor, arguments: argparse.Namespace) -> Choice:
+    if arguments.modes is not None:
+        return compressor.with_modes(compressor.codec.modes)
+    if arguments.error is not None:
+        return compressor.with_error(arguments.error)
+    return compressor.with_size(arguments.size)
+
+
 def _decompress(arguments: argparse.Namespace) -> None:
     if _holds(arguments.mesh, "key0"):
         first, faces = _first_frame(arguments.mesh)
         source = frame_compression.source_of(first, faces)
         frames = frame_compression.restored(first, read_compressed(arguments.file, source))
-        with replacing(arguments.output) as unfinished, unfinished.open("wb") as file:
-            np.savez_compressed(file, faces=faces, frames=frames, key0=first, key1=frames[-1])
+        with replacing(arguments.output) as unfinished:
+            try:
+                with unfinished.open("wb") as file:
+                    np.savez_compressed(file, faces=faces, frames=frames, key0=first, key1=frames[-1])
+            except OSError as error:
+                raise InputError(f"{arguments.output} cannot be written: {error.strerror or error}.") from error
         return
     content = read_tets(arguments.mesh)
     mesh = content.mesh()

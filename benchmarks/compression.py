@@ -51,7 +51,10 @@ def main() -> None:
     if arguments.frames is not None:
         with np.load(arguments.frames, allow_pickle=False) as archive:
             frames, faces = archive["frames"], archive["faces"].astype(np.int64)
-        _print_errors("frames", frame_compression.compressor(frames, faces, MODES))
+        searched = frame_compression.compressor(frames, faces, MODES)
+        _print_errors("frames", searched)
+        for modes in COUNTS:
+            _print_row("frames, fitted, modes alone", searched, searched.with_modes(modes))
 
 
 def _print_errors(label: str, compressor: Compressor) -> None:

@@ -16,6 +16,7 @@ from qc3d_addon.experiments import bijections, shapes, spectra
 from qc3d_addon.experiments.caption import Caption
 from qc3d_addon.solver import compression
 from qc3d_addon.solver.mapping import Mapping
+from qc3d_addon.solver.regular_grid import kuhn_grid
 
 
 @pytest.fixture
@@ -61,6 +62,20 @@ def test_the_bijections_keep_the_faces(bijection: bijections.Callable[..., np.nd
     assert (moved < 1.0 + 1e-12).all()
     inside = np.random.default_rng(1).uniform(0.3, 0.7, (50, 3))
     assert np.abs(bijection(inside) - inside).max() > 0.04
+
+
+def test_what_the_mesh_cannot_follow_is_damped_and_said() -> None:
+    mesh = kuhn_grid(4)
+
+    def steep(points: np.ndarray) -> np.ndarray:
+        return points + 0.3 * np.sin(2.0 * np.pi * points) * np.array([1.0, 0.0, 0.0])
+
+    title, mapping = bijections.without_folds(mesh, "a wave", steep)
+    assert mapping.folds == 0
+    part = float(np.abs(mapping.values - mesh.points).max() / 0.3)
+    assert part < 1.0
+    assert title == f"a wave, {part:.0%} of the displacements".replace("%", " %")
+    assert bijections.without_folds(mesh, "none", lambda points: points)[0] == "none"
 
 
 def test_captions_say_no_where_it_does_not_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

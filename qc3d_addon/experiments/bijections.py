@@ -13,6 +13,7 @@ import numpy as np
 from ..figures.cubes import draw_cube
 from ..figures.slices import cut
 from ..solver.conditions import Conditions
+from ..solver.errors import InputError
 from ..solver.mapping import Mapping
 from ..solver.reconstruction import reconstruct
 from ..solver.tetmesh import Floats, TetMesh
@@ -61,13 +62,13 @@ def draw(number: str, title: str, mapping: Mapping, path: Path) -> Caption:
     )
 
 
-def without_folds(mesh: TetMesh, bijection: Callable[[Floats], Floats]) -> Mapping:
-    """The bijection at the vertices, damped as far as the mesh needs to follow it without a fold."""
-    for damping in (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.1):
-        mapping = Mapping(mesh, mesh.points + damping * (bijection(mesh.points) - mesh.points))
+def without_folds(mesh: TetMesh, title: str, bijection: Callable[[Floats], Floats]) -> tuple[str, Mapping]:
+    """The bijection at the vertices, damped as far as the mesh needs to follow it without a fold; the title says so."""
+    for percent in (100, 90, 80, 70, 60, 50, 25, 10):
+        mapping = Mapping(mesh, mesh.points + percent / 100.0 * (bijection(mesh.points) - mesh.points))
         if mapping.folds == 0:
-            break
-    return mapping
+            return title if percent == 100 else f"{title}, {percent} % of the displacements", mapping
+    raise InputError(f"The mesh is too coarse for this map: {title}.")
 
 
 def _draw_slice(axes: Axes, mapping: Mapping, rebuilt: Mapping) -> None:

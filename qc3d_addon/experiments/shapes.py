@@ -112,11 +112,11 @@ def along_axes(points: Floats) -> Floats:
     return np.column_stack([x**2 * (1.5 - 0.5 * x), (np.exp(y) - 1.0) / (np.e - 1.0), np.sin(0.5 * np.pi * z)])
 
 
-def whirl(points: Floats) -> Floats:
-    """A whirl about the middle of the cube, by up to 90 degrees, that dies away before the faces."""
+def whirl(points: Floats, degrees: float = 90.0) -> Floats:
+    """A whirl about the middle of the cube, by up to so many degrees, that dies away before the faces."""
     offsets = points - 0.5
     fading = np.maximum(1.0 - 4.0 * np.einsum("ij,ij->i", offsets, offsets), 0.0) ** 2
-    turns = 0.5 * np.pi * fading[:, None] * np.array([2.0, -1.0, 2.0]) / 3.0
+    turns = np.radians(degrees) * fading[:, None] * np.array([2.0, -1.0, 2.0]) / 3.0
     return np.asarray(0.5 + np.einsum("nij,nj->ni", rotation_matrices(turns), offsets))
 
 

@@ -34,7 +34,7 @@ _HEADER = struct.Struct("<8sHBBB16s8I3d4d")
 _CHECKSUM = struct.Struct("<I")
 _MAGIC, _VERSION = b"QC3DSPEC", 1
 _MOST_BYTES = 2**30
-_MOST_NUMBERS = 2**26
+_MOST_NUMBERS = 2**24
 _KINDS, _SCHEMES, _BOUNDARIES = get_args(Kind), get_args(Scheme), get_args(Boundary)
 
 
@@ -117,8 +117,12 @@ def plain_bytes(numbers: NDArray[np.int64]) -> bytes:
 
 
 def to_bytes(source: Source, content: Content) -> bytes:
-    """Compressed maps of a mesh as bytes."""
+    """Compressed maps of a mesh as bytes; raises InputError for more numbers than a file may hold."""
     compressed = content.compressed
+    count = compressed.numbers.size + compressed.held.size
+    count += 0 if compressed.remainder is None else compressed.remainder.size
+    if count > _MOST_NUMBERS:
+        raise InputError(f"{count} numbers are more than one file holds, {_MOST_NUMBERS}; store fewer maps or frames.")
     boundary = zlib.compress(np.ascontiguousarray(compressed.held, dtype="<f8").tobytes(), 9)
     numbers = packed(compressed.numbers)
     remainder = b"" if compressed.remainder is None else packed(compressed.remainder, source.predictor)

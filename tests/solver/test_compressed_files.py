@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qc3d_addon.solver import compressed_files
 from qc3d_addon.solver.compressed_files import (
     Content,
     Source,
@@ -93,11 +94,17 @@ def test_nothing_but_a_typed_error_comes_of_any_header(data: st.DataObject) -> N
 
 def test_no_more_numbers_than_bytes_can_hold() -> None:
     data = bytearray(to_bytes(SOURCE, content(maps=1, modes=1, remainder=False)))
-    struct.pack_into("<II", data, 13 + 16 + 4, 2**20, 10)  # modes computed, maps
-    struct.pack_into("<I", data, 13 + 16 + 12, 2**20)  # modes stored
+    struct.pack_into("<II", data, 13 + 16 + 4, 2**17, 10)  # modes computed, maps
+    struct.pack_into("<I", data, 13 + 16 + 12, 2**17)  # modes stored
     data[-4:] = struct.pack("<I", zlib.crc32(bytes(data[:-4])))
     with pytest.raises(InputError, match="cannot hold"):
         from_bytes(bytes(data), SOURCE)
+
+
+def test_more_than_a_file_holds_is_not_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compressed_files, "_MOST_NUMBERS", 833)
+    with pytest.raises(InputError, match="834 numbers are more than one file holds, 833"):
+        to_bytes(SOURCE, content())
 
 
 def test_another_mesh_or_kind() -> None:

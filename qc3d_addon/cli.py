@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NoReturn
 
-from .commands import analyze, reconstruct
+from .commands import analyze, compress, reconstruct, reproduce
 from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing, write_frames
@@ -137,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
     add_settings(bake)
     bake.set_defaults(run=_bake)
 
-    for command in (analyze, reconstruct):
+    for command in (analyze, reconstruct, compress, reproduce):
         command.add_to(commands)
     return parser
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compressed maps as files: versioned, self-contained up to the mesh, and checked before anything is believed.
 
-A file is a header, what it is about in fixed fields, and one compressed block: no names of files, no code, no pickled
-objects.
+A file is a header of fixed fields and three blocks: a fixed boundary's images, the numbers of the modes, and those of
+the remainder. There are no names of files in it, no code and no pickled objects.
 """
 
 from __future__ import annotations
@@ -11,170 +11,219 @@ from __future__ import annotations
 import hashlib
 import struct
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .array_files import replacing
 from .compression import Boundary, Compressed, Scheme
 from .errors import InputError
-from .tetmesh import TetMesh
-from .whole_numbers import deflated, inflated, packed, unpacked
+from .prediction import Predictor
+from .tetmesh import Floats, Ints
+from .whole_numbers import inflated, packed, planes, unpacked
 
-# Magic, version, scheme, boundary, vertices, tetrahedra, modes, maps, bytes before compression, the mesh's digest.
-_HEADER = struct.Struct("<8sHBBIIIIQ32s")
-_CHECK = struct.Struct("<I")
+Kind = Literal["maps", "frames"]
+
+# Magic, version, kind, scheme, boundary, the source's digest, its points, modes computed, maps, modes stored, points of
+# the boundary, points of the remainder, bytes of the boundary and of the modes, both steps, the check, the placement.
+_HEADER = struct.Struct("<8sHBBB16s8I3d4d")
+_CHECKSUM = struct.Struct("<I")
 _MAGIC, _VERSION = b"QC3DSPEC", 1
-_MAP = struct.Struct("<dIIdI")  # step, modes, boundary vertices, step of the remainder, numbers of the remainder
-_MOST_BYTES = 2**31
-_SCHEMES, _BOUNDARIES = get_args(Scheme), get_args(Boundary)
+_MOST_BYTES = 2**30
+_MOST_NUMBERS = 2**24
+_KINDS, _SCHEMES, _BOUNDARIES = get_args(Kind), get_args(Scheme), get_args(Boundary)
 
 
 @dataclass(frozen=True, eq=False)
-class CompressedMaps:
-    """Maps of one mesh, all by one scheme.
+class Source:
+    """What the file does not hold and its reader must have: the mesh.
+
+    Parameters
+    ----------
+    kind : Kind
+        ``maps`` of a tetrahedral mesh, or ``frames`` of a surface.
+    points : (n, 3)
+        Its vertices.
+    cells : (m, 3 or 4)
+        Its triangles or tetrahedra.
+    """
+
+    kind: Kind
+    points: Floats
+    cells: Ints
+
+    @cached_property
+    def digest(self) -> bytes:
+        """16 bytes that tell meshes apart."""
+        found = hashlib.sha256(np.ascontiguousarray(self.points, dtype="<f8").tobytes())
+        found.update(np.ascontiguousarray(self.cells, dtype="<i8").tobytes())
+        return found.digest()[:16]
+
+    @cached_property
+    def predictor(self) -> Predictor:
+        """Predicts displacements from those around."""
+        return Predictor(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What a file holds.
 
     Parameters
     ----------
     modes : int
         How many modes were computed: the restoring needs as many.
-    maps : tuple of Compressed
+    compressed : Compressed
+    placement : tuple of four floats
+        For frames: the corner and the scale that take them into the cube.
     """
 
     modes: int
-    maps: tuple[Compressed, ...]
-
-    @property
-    def scheme(self) -> Scheme:
-        """The scheme of all maps."""
-        return self.maps[0].scheme
-
-    @property
-    def boundary(self) -> Boundary:
-        """What the boundary of all maps does."""
-        return self.maps[0].boundary
+    compressed: Compressed
+    placement: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
 
-def to_bytes(mesh: TetMesh, content: CompressedMaps) -> bytes:
-    """Compressed maps of a mesh as bytes."""
-    body = b"".join(_map_bytes(each) for each in content.maps)
+class Packer:
+    """Makes files of one source.
+
+    Parameters
+    ----------
+    source : Source
+    modes, placement
+        See ``Content``.
+    """
+
+    def __init__(
+        self, source: Source, modes: int, placement: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    ) -> None:
+        self.source, self._modes, self._placement = source, modes, placement
+
+    def bytes_of(self, compressed: Compressed) -> bytes:
+        """The file."""
+        return to_bytes(self.source, Content(self._modes, compressed, self._placement))
+
+    def size(self, compressed: Compressed) -> int:
+        """Its length."""
+        return len(self.bytes_of(compressed))
+
+
+def plain_bytes(numbers: NDArray[np.int64]) -> bytes:
+    """Displacements (F, n, 3) as whole numbers, deflated and nothing else: what compression is compared with."""
+    return zlib.compress(planes(numbers.transpose(0, 2, 1)), 9)
+
+
+def to_bytes(source: Source, content: Content) -> bytes:
+    """Compressed maps of a mesh as bytes; raises InputError for more numbers than a file may hold."""
+    compressed = content.compressed
+    count = compressed.numbers.size + compressed.held.size
+    count += 0 if compressed.remainder is None else compressed.remainder.size
+    if count > _MOST_NUMBERS:
+        raise InputError(f"{count} numbers are more than one file holds, {_MOST_NUMBERS}; store fewer maps or frames.")
+    boundary = zlib.compress(np.ascontiguousarray(compressed.held, dtype="<f8").tobytes(), 9)
+    numbers = packed(compressed.numbers)
+    remainder = b"" if compressed.remainder is None else packed(compressed.remainder, source.predictor)
     header = _HEADER.pack(
         _MAGIC,
         _VERSION,
-        _SCHEMES.index(content.scheme),
-        _BOUNDARIES.index(content.boundary),
-        len(mesh.points),
-        len(mesh.tets),
+        _KINDS.index(source.kind),
+        _SCHEMES.index(compressed.scheme),
+        _BOUNDARIES.index(compressed.boundary),
+        source.digest,
+        len(source.points),
         content.modes,
-        len(content.maps),
-        len(body),
-        digest(mesh),
+        len(compressed.numbers),
+        compressed.numbers.shape[1],
+        compressed.held.shape[1],
+        0 if compressed.remainder is None else compressed.remainder.shape[1],
+        len(boundary),
+        len(numbers),
+        compressed.step,
+        compressed.remainder_step,
+        compressed.check,
+        *content.placement,
     )
-    data = header + deflated(body)
-    return data + _CHECK.pack(zlib.crc32(data))
+    data = header + boundary + numbers + remainder
+    return data + _CHECKSUM.pack(zlib.crc32(data))
 
 
-def from_bytes(data: bytes, mesh: TetMesh) -> CompressedMaps:
-    """What ``to_bytes`` made, for the same mesh.
+def from_bytes(data: bytes, source: Source) -> Content:
+    """What ``to_bytes`` made, for the same source.
 
     Raises
     ------
     InputError
-        If the data is damaged, of another version, or of another mesh.
+        If the data is damaged, of another version or kind, or of another mesh.
     """
-    if len(data) < _HEADER.size + _CHECK.size or data[:8] != _MAGIC:
+    if len(data) < _HEADER.size + _CHECKSUM.size or data[:8] != _MAGIC:
         raise InputError("This is not a file of compressed maps.")
     fields = _HEADER.unpack_from(data)
-    version, scheme, boundary, vertices, tets, modes, count, size, meshed = fields[1:]
+    _, version, kind, scheme, boundary, digest = fields[:6]
+    points, modes, count, stored, held, rest, held_bytes, number_bytes = fields[6:14]
+    step, remainder_step, check = fields[14:17]
     if version != _VERSION:
         raise InputError(f"The compressed maps have version {version}; this program reads version {_VERSION}.")
-    if _CHECK.unpack(data[-_CHECK.size :])[0] != zlib.crc32(data[: -_CHECK.size]):
+    if _CHECKSUM.unpack(data[-_CHECKSUM.size :])[0] != zlib.crc32(data[: -_CHECKSUM.size]):
         raise InputError("The compressed maps are damaged: the checksum is wrong.")
-    if (vertices, tets) != (len(mesh.points), len(mesh.tets)) or meshed != digest(mesh):
-        raise InputError("The maps were compressed on another mesh; give the one they belong to.")
-    most = count * (_MAP.size + 2 + 8 * (6 * modes + 6 * vertices))
-    if scheme >= len(_SCHEMES) or boundary >= len(_BOUNDARIES) or not count or modes > vertices:
+    if kind >= len(_KINDS) or scheme >= len(_SCHEMES) or boundary >= len(_BOUNDARIES):
         raise InputError("The compressed maps are damaged: their header makes no sense.")
-    if not size <= min(most, _MOST_BYTES):
+    if _KINDS[kind] != source.kind:
+        raise InputError(f"The file holds {_KINDS[kind]}; give what these belong to.")
+    if points != len(source.points) or digest != source.digest:
+        raise InputError("The file was made for another mesh; give the one it belongs to.")
+    body = data[_HEADER.size : -_CHECKSUM.size]
+    sound = (
+        count > 0
+        and stored <= modes <= _MOST_NUMBERS
+        and held <= points
+        and rest in (0, points)
+        and count * (6 * stored + 3 * held + 3 * rest) <= _MOST_NUMBERS
+        and held_bytes + number_bytes <= len(body)
+        and np.isfinite(fields[14:]).all()
+        and step >= 0.0 <= remainder_step
+        and fields[20] > 0.0
+    )
+    if not sound:
         raise InputError("The compressed maps are damaged, or larger than can be read.")
-    body = inflated(data[_HEADER.size : -_CHECK.size], size)
-    if len(body) != size:
-        raise InputError("The compressed maps end too early; the file is damaged.")
-    maps = []
-    for _ in range(count):
-        found, used = _map_of(body, _SCHEMES[scheme], _BOUNDARIES[boundary], modes, vertices)
-        maps.append(found)
-        body = body[used:]
-    if body:
+    images = np.frombuffer(inflated(body[:held_bytes], 24 * count * held), "<f8").reshape(count, held, 3)
+    if not np.isfinite(images).all():
+        raise InputError("The compressed maps hold numbers that are not finite; the file is damaged.")
+    numbers = unpacked(body[held_bytes : held_bytes + number_bytes], (count, stored, 6))
+    left = body[held_bytes + number_bytes :]
+    remainder = unpacked(left, (count, rest, 3), source.predictor) if rest else None
+    if left and not rest:
         raise InputError("There is more in the compressed maps than they say; the file is damaged.")
-    return CompressedMaps(modes, tuple(maps))
+    compressed = Compressed(
+        _SCHEMES[scheme],
+        _BOUNDARIES[boundary],
+        step,
+        numbers,
+        images.astype(np.float64),
+        check,
+        remainder_step,
+        remainder,
+    )
+    return Content(modes, compressed, fields[17:21])
 
 
-def write_compressed(path: Path, mesh: TetMesh, content: CompressedMaps) -> int:
-    """Write a file whole or not at all; returns its size in bytes. Raises InputError if it cannot be written."""
-    data = to_bytes(mesh, content)
+def write_compressed(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all. Raises InputError if it cannot be written."""
     with replacing(path) as unfinished:
         try:
             unfinished.write_bytes(data)
         except OSError as error:
             raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
-    return len(data)
 
 
-def read_compressed(path: Path, mesh: TetMesh) -> CompressedMaps:
-    """Read a file of compressed maps of a mesh; raises InputError if it cannot be read or is something else."""
+def read_compressed(path: Path, source: Source) -> Content:
+    """Read a file of compressed maps; raises InputError if it cannot be read or is something else."""
     try:
         size = path.stat().st_size
         if size > _MOST_BYTES:
             raise InputError(f"{path} has {size} bytes, more than compressed maps ever have.")
-        return from_bytes(path.read_bytes(), mesh)
+        return from_bytes(path.read_bytes(), source)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-
-
-def digest(mesh: TetMesh) -> bytes:
-    """32 bytes that tell meshes apart."""
-    found = hashlib.sha256(np.ascontiguousarray(mesh.points, dtype="<f8"))
-    found.update(np.ascontiguousarray(mesh.tets, dtype="<i8"))
-    return found.digest()
-
-
-def _map_bytes(compressed: Compressed) -> bytes:
-    head = _MAP.pack(
-        compressed.step,
-        len(compressed.numbers),
-        len(compressed.held),
-        compressed.remainder_step,
-        len(compressed.remainder),
-    )
-    # By channel: the modes of a channel fade out together.
-    numbers = packed(compressed.numbers.T) + packed(compressed.remainder)
-    return head + np.ascontiguousarray(compressed.held, dtype="<f8").tobytes() + numbers
-
-
-def _map_of(
-    data: bytes, scheme: Scheme, boundary: Boundary, modes: int, vertices: int
-) -> tuple[Compressed, int]:
-    """The map at the beginning of ``data``, and how many bytes it took."""
-    if len(data) < _MAP.size:
-        raise InputError("The compressed maps end too early; the file is damaged.")
-    step, count, held, remainder_step, rest = _MAP.unpack_from(data)
-    if count > modes or held > vertices or rest > 3 * vertices or len(data) < _MAP.size + 24 * held:
-        raise InputError("The compressed maps are damaged: a map is larger than its mesh.")
-    images = np.frombuffer(data, "<f8", 3 * held, _MAP.size).reshape(held, 3).astype(np.float64)
-    if not (np.isfinite([step, remainder_step]).all() and step >= 0.0 <= remainder_step and np.isfinite(images).all()):
-        raise InputError("The compressed maps hold numbers that are not finite; the file is damaged.")
-    used = _MAP.size + 24 * held
-    numbers, length = unpacked(data[used:], 6 * count)
-    used += length
-    remainder, length = unpacked(data[used:], rest)
-    by_mode = numbers.reshape(6, count).T
-    return Compressed(scheme, boundary, step, by_mode, images, remainder_step, remainder), used + length
-
-
-def sizes(mesh: TetMesh, maps: Sequence[Compressed], modes: int) -> int:
-    """How many bytes a file of these maps has."""
-    return len(to_bytes(mesh, CompressedMaps(modes, tuple(maps))))

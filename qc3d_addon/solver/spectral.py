@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smooth functions on a tetrahedral mesh, the lowest frequencies first, and values carried between tets and vertices.
 
-The eigenfunctions of the Laplacian, L phi = lambda M phi, with the stiffness matrix L of linear elements and lumped
-vertex volumes M (Chen & Lui, section 7).
+The eigenfunctions of the Laplacian, L phi = lambda M phi, with the stiffness matrix L of linear elements. M holds the
+lumped vertex volumes (Chen & Lui, section 7), or the same weight for every vertex: since the mesh is finest where the
+shape is, low modes of the second kind have their detail there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
@@ -23,6 +25,8 @@ from .tetmesh import Floats, TetMesh
 _SHIFT = -0.1
 _SEED = 20230805
 
+Weights = Literal["volume", "equal"]
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -33,7 +37,7 @@ class Spectrum:
     eigenvalues : (k,)
         Ascending; the first is 0 for a mesh in one piece. One over a length squared.
     modes : (N, k)
-        Values at the vertices, orthonormal with the vertices' volumes as weights.
+        Values at the vertices, orthonormal with the vertices' weights, which sum to the mesh's volume.
     """
 
     eigenvalues: Floats
@@ -55,7 +59,8 @@ class Transfer:
     def vertex_volumes(self) -> Floats:
         """(N,) a quarter of the volume of the tetrahedra around each vertex."""
         mesh = self._mesh
-        return np.bincount(mesh.tets.ravel(), weights=np.repeat(mesh.volumes / 4.0, 4), minlength=len(mesh.points))
+        weights = np.repeat(mesh.volumes / 4.0, 4)
+        return np.asarray(np.bincount(mesh.tets.ravel(), weights, len(mesh.points)), dtype=np.float64)
 
     @cached_property
     def to_vertices(self) -> csr_array:
@@ -75,8 +80,17 @@ class Transfer:
         return csr_array((quarters, mesh.tets.ravel(), starts), (len(mesh.tets), len(mesh.points)))
 
 
-def spectrum(mesh: TetMesh, count: int) -> Spectrum:
-    """The lowest ``count`` modes; the same on every call, and up to rounding on every machine.
+def spectrum(mesh: TetMesh, count: int, weights: Weights = "volume") -> Spectrum:
+    """The lowest ``count`` modes; the same on every call.
+
+    On another machine they are the same up to rounding, unless a symmetry of the mesh makes two eigenvalues equal.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    count : int
+    weights : Weights
+        What a vertex weighs: ``volume`` as published, or ``equal``.
 
     Raises
     ------
@@ -90,8 +104,11 @@ def spectrum(mesh: TetMesh, count: int) -> Spectrum:
         stiffness_elements(mesh.volumes, mesh.gradients)
     )
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    mass = Transfer(mesh).vertex_volumes
+    if weights == "equal":
+        mass = np.full(len(mass), mass.mean())
     # With the square root of the mass on both sides the problem is an ordinary symmetric one.
-    scale = 1.0 / np.sqrt(np.maximum(Transfer(mesh).vertex_volumes, 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(mass, 1e-300))
     matrix = csc_array(diags_array(scale) @ stiffness @ diags_array(scale))
     start = np.random.default_rng(_SEED).normal(size=len(mesh.points))
     values, vectors = eigsh(matrix, k=count, sigma=_SHIFT / size**2, v0=start)

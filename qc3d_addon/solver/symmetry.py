@@ -45,8 +45,8 @@ def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float
     images = points.copy()
     images[:, axis] *= -1.0
     distances, near = cKDTree(points).query(images, k=min(_MOST_TOGETHER, count), distance_upper_bound=reach)
-    candidates = np.isfinite(distances.reshape(count, -1))
-    near = near.reshape(count, -1)
+    candidates = np.isfinite(np.reshape(distances, (count, -1)))
+    near = np.reshape(near, (count, -1))
     missing = ~candidates.any(axis=1)
     if missing.any():
         raise _no_symmetry(int(missing.sum()), count, axis)

@@ -4,28 +4,12 @@
 
 from __future__ import annotations
 
-from itertools import permutations
-
 import numpy as np
 from scipy.spatial import Delaunay
 
+from qc3d_addon.solver.regular_grid import kuhn_grid
 from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.tetmesh import Floats, Ints, TetMesh, edge_matrices
-
-
-def kuhn_grid(cells: int) -> TetMesh:
-    """The unit cube in ``cells``^3 small cubes, each cut into six tetrahedra along its diagonal (Freudenthal, Kuhn)."""
-    ticks = np.arange(cells + 1)
-    grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-    strides = np.array([(cells + 1) ** 2, cells + 1, 1])
-    origins = grid[(grid < cells).all(axis=1)] @ strides
-    walks = []
-    for order in permutations(range(3)):
-        corners = np.cumsum([0, *(strides[axis] for axis in order)])
-        odd = np.linalg.det(np.eye(3)[list(order)]) < 0.0
-        walks.append(corners[[0, 2, 1, 3]] if odd else corners)
-    tets = (origins[:, None, None] + np.array(walks)).reshape(-1, 4)
-    return TetMesh(grid / cells, tets.astype(np.int64))
 
 
 def jittered_grid(cells: int, seed: int, amount: float = 0.15) -> TetMesh:

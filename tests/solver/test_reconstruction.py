@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qc3d_addon.experiments import shapes
+from qc3d_addon.experiments.shapes import along_axes
 from qc3d_addon.solver import reconstruction
 from qc3d_addon.solver.errors import ReconstructionError
 from qc3d_addon.solver.reconstruction import Reconstructor
@@ -21,7 +23,6 @@ from qc3d_addon.solver.representation import (
     polar_decomposition,
     upper_triangle,
 )
-from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.tetmesh import Bools, Floats, Ints, TetMesh
 
 from .meshes import jittered_grid, kuhn_grid, sine_map
@@ -57,18 +58,9 @@ def held_with(mesh: TetMesh, landmarks: Ints) -> Bools:
     return held
 
 
-def along_axes(points: Floats) -> Floats:
-    """Every coordinate stretched by its own smooth bijection of 0..1."""
-    x, y, z = points.T
-    return np.column_stack([x**2 * (1.5 - 0.5 * x), (np.exp(y) - 1.0) / (np.e - 1.0), np.sin(0.5 * np.pi * z)])
-
-
 def whirl(points: Floats) -> Floats:
-    """A whirl about the middle of the cube, by up to 60 degrees, that dies away before the faces."""
-    offsets = points - 0.5
-    fading = np.maximum(1.0 - 4.0 * np.einsum("ij,ij->i", offsets, offsets), 0.0) ** 2
-    turns = np.radians(60.0) * fading[:, None] * np.array([2.0, -1.0, 2.0]) / 3.0
-    return np.asarray(0.5 + np.einsum("nij,nj->ni", rotation_matrices(turns), offsets))
+    """Coarse meshes follow 60 degrees."""
+    return shapes.whirl(points, 60.0)
 
 
 def sliding(points: Floats) -> Floats:

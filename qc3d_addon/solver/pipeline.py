@@ -40,8 +40,11 @@ T = TypeVar("T")
 _LARGE_RESIDUAL = 0.03
 
 
+STAGES = ("mesh", "locate", "fit", "factor", "frames")
+
+
 class Progress(NamedTuple):
-    """Where the work is: the stage's name and how much of that stage is done, 0..1."""
+    """Where the work is: the stage's name, one of ``STAGES``, and how much of that stage is done, 0..1."""
 
     stage: str
     fraction: float

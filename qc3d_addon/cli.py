@@ -19,7 +19,7 @@ from .commands import analyze, compress, reconstruct, reproduce
 from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing, write_frames
-from .solver.errors import InputError, QC3DError, naming_pair
+from .solver.errors import InputError, QC3DError, naming_pair, on_one_line
 from .solver.pipeline import chain_inbetweens, evenly_spaced, finish, prepare
 
 MOST_FRAMES = 10_000
@@ -93,7 +93,7 @@ def _bake(arguments: argparse.Namespace) -> None:
 
 def _print_notes(notes: Iterable[str]) -> None:
     for note in notes:
-        print(f"qc3d: {note}", file=sys.stderr)
+        print(f"qc3d: {on_one_line(note)}", file=sys.stderr)
 
 
 def _key_names(arguments: argparse.Namespace) -> tuple[str, ...]:

@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
+import math
 import os
+import stat
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy_format
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
@@ -22,6 +26,7 @@ from .tetmesh import Floats
 
 # All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd shapes.
 _UNREADABLE = (OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
+MOST_BYTES = 2**31  # of a file that is read, and of an array in it
 
 
 def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
@@ -88,16 +93,17 @@ def open_archive(path: Path, needed: str) -> Iterator[NpzFile]:
     InputError
         If the file cannot be read or is something else.
     """
-    try:
-        archive = np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {_reason(error)}.") from error
-    except _UNREADABLE:
-        archive = None
-    if not isinstance(archive, NpzFile):
-        raise InputError(f"{path} is not an .npz file of arrays; {needed}.")
-    with archive:
-        yield archive
+    require_file(path)
+    with ExitStack() as stack:
+        try:
+            archive = np.load(stack.enter_context(path.open("rb")), allow_pickle=False)
+        except OSError as error:
+            raise unreadable(path, error) from error
+        except _UNREADABLE:
+            archive = None
+        if not isinstance(archive, NpzFile):
+            raise InputError(f"{path} is not an .npz file of arrays; {needed}.")
+        yield stack.enter_context(archive)
 
 
 def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
@@ -109,12 +115,69 @@ def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
         If there is no such array, or it cannot be read.
     """
     try:
+        if name in archive.files:
+            _require_size(archive.zip, f"{name}.npy")  # type: ignore[arg-type]
         array: NDArray[np.generic] = archive[name]
     except KeyError:
         raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None
-    except _UNREADABLE as error:
-        raise InputError(f"The array {name} in {path} cannot be read: {_reason(error)}.") from error
+    except (*_UNREADABLE, NotImplementedError) as error:
+        raise unreadable(f"The array {name} in {path}", error) from error
     return array
+
+
+def require_file(path: Path) -> None:
+    """Check a name before it is opened: pipes and devices may never end.
+
+    Raises
+    ------
+    InputError
+        If there is no ordinary file of that name, or it is larger than any file should be that is read here.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from error
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{path} is no file that can be read; name a file.")
+    if found.st_size > MOST_BYTES:
+        raise InputError(f"{path} has {found.st_size} bytes, and at most {MOST_BYTES} are read; make it smaller.")
+
+
+def unreadable(what: Path | str, error: BaseException) -> InputError:
+    """The error to raise where reading failed."""
+    return InputError(f"{what} cannot be read: {_reason(error)}; export it again, or name another file.")
+
+
+def require_sizes(archive: zipfile.ZipFile) -> None:
+    """Check, before anything is allocated, that every array is as large as its entry says, and all can be held.
+
+    Raises
+    ------
+    ValueError
+        If not.
+    """
+    if sum(info.file_size for info in archive.infolist()) > MOST_BYTES:
+        raise ValueError("the arrays are too large")
+    for info in archive.infolist():
+        _require_size(archive, info.filename)
+
+
+def _require_size(archive: zipfile.ZipFile, name: str) -> None:
+    """Raise ValueError unless an array is as large as its entry says, and of a size that can be held."""
+    npy: Any = npy_format  # without types in some versions
+    info = archive.getinfo(name)
+    if info.file_size > MOST_BYTES:
+        raise ValueError(f"it has {info.file_size} bytes, and at most {MOST_BYTES} are read")
+    with archive.open(info) as file:
+        read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+        version = npy.read_magic(file)
+        if version not in read_header:
+            raise ValueError(f"it has version {version}, which is not known")
+        shape, _, dtype = read_header[version](file)
+        if dtype.hasobject:
+            raise ValueError("it holds objects of Python, which are never read")
+        if file.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
+            raise ValueError("it is not as large as it says")
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from .array_files import replacing
+from .array_files import MOST_BYTES, replacing, require_file, unreadable
 from .compression import Boundary, Compressed, Scheme
 from .errors import InputError
 from .prediction import Predictor

@@ -140,7 +140,12 @@ def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | Non
         flags = subprocess.CREATE_NO_WINDOW
     with open(errors, "wb") as stream:
         process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, creationflags=flags
+            command,
+            cwd=errors.parent,  # fTetWild writes files of its own where it runs
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=stream,
+            creationflags=flags,
         )
         try:
             status = process.wait(time_limit)

@@ -20,7 +20,11 @@ from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing, write_frames
 from .solver.errors import InputError, QC3DError, naming_pair, on_one_line
-from .solver.pipeline import chain_inbetweens, evenly_spaced, finish, prepare
+from .solver.keypair import KeyPair
+from .solver.pipeline import Bake, Steps, chain_inbetweens, evenly_spaced, finish, prepare
+from .solver.settings import Settings
+from .solver.straight import straight_inbetweens
+from .solver.tetmesh import Floats
 
 MOST_FRAMES = 10_000
 
@@ -57,11 +61,7 @@ def _interpolate(arguments: argparse.Namespace) -> None:
         output = stack.enter_context(replacing(arguments.output))
         report = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
         with StageBars() as bars:
-            prepared = []
-            for pair, ends in zip(pairs, pairwise(names), strict=True):
-                with naming_pair(*ends, names):
-                    prepared.append(finish(prepare(pair, settings), bars))
-            bake = finish(chain_inbetweens(prepared, times, settings), bars)
+            bake = finish(_inbetweens(pairs, names, times, settings), bars)
         try:
             write_frames(output, pairs, bake.times, bake.frames)
             if report is not None:
@@ -69,6 +69,16 @@ def _interpolate(arguments: argparse.Namespace) -> None:
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
     _print_notes(bake.report["notes"])
+
+
+def _inbetweens(pairs: Sequence[KeyPair], names: Sequence[str], times: Floats, settings: Settings) -> Steps[Bake]:
+    if settings.mode == "straight":
+        return (yield from straight_inbetweens(pairs, times, settings))
+    prepared = []
+    for pair, ends in zip(pairs, pairwise(names), strict=True):
+        with naming_pair(*ends, names):
+            prepared.append((yield from prepare(pair, settings)))
+    return (yield from chain_inbetweens(prepared, times, settings))
 
 
 def _bake(arguments: argparse.Namespace) -> None:

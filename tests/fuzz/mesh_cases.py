@@ -309,9 +309,8 @@ def _as_kind(values: Array, kind: str) -> Any:  # noqa: ANN401 - an array of wha
 def _other_shapes(mesh: Mesh, random: Random) -> None:
     number = int(random.integers(len(mesh.shapes)))
     shape = mesh.shapes[number]
-    mesh.shapes[number] = _one_of(
-        random, [shape[:-1], shape[:, :2], shape.reshape(-1), shape[None], shape.tolist(), None, [], [[1, 2, 3], [1]], 7]
-    )
+    odd = [shape[:-1], shape[:, :2], shape.reshape(-1), shape[None], shape.tolist(), None, [], [[1, 2, 3], [1]], 7]
+    mesh.shapes[number] = _one_of(random, odd)
 
 
 def _other_face_shapes(mesh: Mesh, random: Random) -> None:

@@ -9,7 +9,6 @@ import json
 import sys
 import tomllib
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import NoReturn
 from .commands import analyze, compress, reconstruct, reproduce
 from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
-from .solver.array_files import read_pairs, replacing, write_frames
+from .solver.array_files import read_pairs, replacing_all, write_frames
 from .solver.errors import InputError, QC3DError, naming_pair, on_one_line
 from .solver.keypair import KeyPair
 from .solver.pipeline import Bake, Steps, chain_inbetweens, evenly_spaced, finish, prepare
@@ -57,14 +56,13 @@ def _interpolate(arguments: argparse.Namespace) -> None:
     names = _key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * len(pairs) - 1)
-    with ExitStack() as stack:
-        output = stack.enter_context(replacing(arguments.output))
-        report = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
+    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    with replacing_all(*files) as (output, *reports):
         with StageBars() as bars:
             bake = finish(_inbetweens(pairs, names, times, settings), bars)
         try:
             write_frames(output, pairs, bake.times, bake.frames)
-            if report is not None:
+            for report in reports:
                 report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import stat
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -192,21 +193,65 @@ def replacing(path: Path) -> Iterator[Path]:
     InputError
         If ``path`` cannot be written.
     """
+    with replacing_all(path) as (new,):
+        yield new
+
+
+@contextmanager
+def replacing_all(*paths: Path) -> Iterator[list[Path]]:
+    """As ``replacing`` for several files: all take their places, or none does."""
+    targets = [path.resolve() for path in paths]
+    with ExitStack() as stack:
+        new = []
+        for path, target in zip(paths, targets, strict=True):
+            new.append(_new_beside(path, target))
+            stack.callback(new[-1].unlink, missing_ok=True)
+        yield new
+        with ExitStack() as undo:
+            for number, (file, target) in enumerate(zip(new, targets, strict=True)):
+                if number < len(new) - 1:  # after the last nothing can fail
+                    undo.callback(_put_back, target, stack.enter_context(_set_aside(target)))
+                try:
+                    file.replace(target)
+                except OSError as error:
+                    raise InputError(f"{target} cannot be written: {_reason(error)}; nothing was.") from error
+            undo.pop_all()
+
+
+def _new_beside(path: Path, target: Path) -> Path:
     if path.is_dir():
         raise InputError(f"{path} is a folder; give the name of a file.")
-    target = path.resolve()
     new = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         new.touch(exist_ok=False)
         new.unlink()  # Blender would keep even an empty file as a backup of the one it saves
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
+    return new
+
+
+@contextmanager
+def _set_aside(target: Path) -> Iterator[Path | None]:
+    """Another name for the file that is there now, if there is one, gone when the block ends."""
+    if not target.exists():
+        yield None
+        return
+    kept = target.with_name(f".{target.stem}.{os.getpid()}.old{target.suffix}")
     try:
-        yield new
-        new.replace(target)
+        os.link(target, kept)
+    except OSError:  # not every file system has links
+        shutil.copy2(target, kept)
+    try:
+        yield kept
     finally:
-        with suppress(FileNotFoundError):
-            new.unlink()
+        kept.unlink(missing_ok=True)
+
+
+def _put_back(target: Path, kept: Path | None) -> None:
+    if kept is None:
+        target.unlink(missing_ok=True)
+    else:
+        kept.replace(target)
 
 
 def _reason(error: BaseException) -> str:

@@ -20,9 +20,11 @@ from .progress_bars import StageBars
 from .solver.array_files import read_pairs, replacing_all, write_frames
 from .solver.errors import InputError, QC3DError, naming_pair, on_one_line
 from .solver.keypair import KeyPair
+from .solver.memory import machine_limit_mb
 from .solver.pipeline import Bake, Steps, chain_inbetweens, evenly_spaced, finish, prepare
 from .solver.settings import Settings
 from .solver.straight import straight_inbetweens
+from .solver.task import Task
 from .solver.tetmesh import Floats
 
 MOST_FRAMES = 10_000
@@ -56,6 +58,7 @@ def _interpolate(arguments: argparse.Namespace) -> None:
     names = _key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * len(pairs) - 1)
+    Task(dict(zip(pairwise(names), pairs, strict=True)), names, settings, times).require_memory(machine_limit_mb())
     files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
     with replacing_all(*files) as (output, *reports):
         with StageBars() as bars:

@@ -34,10 +34,12 @@ def bake_object(
         If the object, the keys or the settings cannot be used; the object is as it was.
     """
     # Imported where it is used: scipy would make Blender start slower.
+    from ..solver.memory import machine_limit_mb
     from ..solver.pipeline import finish
     from ..solver.task import carry_out
 
     plan = plan_bake(obj, request)
+    plan.task.require_memory(machine_limit_mb())
     return write_bake(plan, finish(carry_out(plan.task), on_progress))
 
 

@@ -4,7 +4,6 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
 
 _PACKAGE = __package__.rpartition(".")[0]  # what Blender knows the add-on by
 _MINUTES = 60
-_SHARE_OF_MEMORY = 0.75
 
 
 class QC3DPreferences(bpy.types.AddonPreferences):
@@ -50,18 +48,11 @@ class QC3DPreferences(bpy.types.AddonPreferences):
 
 def limits(context: bpy.types.Context) -> "Limits":
     """What the child process may use."""
+    from ..solver.memory import machine_limit_mb
     from ..worker.client import Limits
 
     addon = context.preferences.addons.get(_PACKAGE)
     chosen = None if addon is None else addon.preferences
     minutes = _MINUTES if chosen is None else chosen.time_limit
     memory = 0 if chosen is None else chosen.memory_limit
-    return Limits(60.0 * minutes, memory or _automatic_memory())
-
-
-def _automatic_memory() -> int:
-    try:
-        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
-        return 0
-    return int(_SHARE_OF_MEMORY * total / 2**20)
+    return Limits(60.0 * minutes, memory or machine_limit_mb())

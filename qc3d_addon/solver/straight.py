@@ -17,6 +17,7 @@ from .memory import peak_memory_mb
 from .pipeline import Bake, Progress, Steps, checked_times, require_chain, split
 from .report import crossing_notes
 from .settings import Settings
+from .tetmesh import Floats
 from .uncrossing import CrossingLimit
 
 
@@ -46,9 +47,7 @@ def straight_inbetweens(pairs: Sequence[KeyPair], times: ArrayLike, settings: Se
     wanted = checked_times(times)
     require_chain(pairs)
     segments, local = split(eased(wanted, settings.easing), len(pairs))
-    limits = [
-        CrossingLimit(pair.faces, pair.key0, pair.key1, (pair.key0 == pair.key1).all(axis=1)) for pair in pairs
-    ]
+    limits = [_Crossings(pair) for pair in pairs]
     frames = np.empty((len(wanted), *pairs[0].key0.shape))
     crossings = []
     for index, (number, time) in enumerate(zip(segments.tolist(), local.tolist(), strict=True)):
@@ -75,3 +74,20 @@ def straight_inbetweens(pairs: Sequence[KeyPair], times: ArrayLike, settings: Se
         "seconds": {"frames": clock.perf_counter() - started},
     }
     return Bake(wanted, frames, report)
+
+
+class _Crossings:
+    """Counts the crossings of frames of a pair beyond those of its keys, in units that suit them."""
+
+    def __init__(self, pair: KeyPair) -> None:
+        self._origin = pair.key0[0]
+        self._scale = 1.0 / max(float(np.ptp(key, axis=0).max()) for key in (pair.key0, pair.key1))
+        still = (pair.key0 == pair.key1).all(axis=1)
+        self._limit = CrossingLimit(pair.faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
+
+    def excess(self, frame: Floats) -> int:
+        """Crossing pairs of triangles of a frame (n, 3) beyond what the keys have."""
+        return self._limit.excess(self._scaled(frame))
+
+    def _scaled(self, positions: Floats) -> Floats:
+        return np.asarray((positions - self._origin) * self._scale)

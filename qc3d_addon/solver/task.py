@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from .colliders import Collider
 from .errors import naming_pair
 from .keypair import KeyPair
-from .pipeline import Bake, Steps, chain_inbetweens, prepare
+from .memory import estimated_mb, require_memory
+from .pipeline import Bake, Steps, chain_inbetweens, checked_times, prepare
 from .settings import Settings
 from .storage import from_bytes, to_bytes
 from .straight import straight_inbetweens
@@ -84,6 +85,13 @@ class Task:
         """How many maps have to be made."""
         return len(self.pairs) - len(self.kept) if self.needs_maps else 0
 
+    def require_memory(self, limit_mb: float) -> None:
+        """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
+        vertices = len(next(iter(self.pairs.values())).key0)
+        needed = estimated_mb(vertices, len(self.pairs), len(self.times), self.settings.quality, self.needs_maps)
+        if limit_mb:
+            require_memory(needed, limit_mb, vertices)
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -109,6 +117,7 @@ def carry_out(task: Task) -> Steps[Outcome]:
     QC3DError
         If a kept map is damaged or belongs to other keys, a map cannot be made, or a time is outside 0..1.
     """
+    checked_times(task.times)  # before the slow part
     if not task.needs_maps:
         along = [task.pairs[ends] for ends in pairwise(task.through)]
         return Outcome({}, (yield from straight_inbetweens(along, task.times, task.settings)))

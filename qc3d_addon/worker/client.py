@@ -52,6 +52,8 @@ class Worker:
 
     Raises
     ------
+    InputError
+        If the task needs more memory than its limit.
     WorkerError
         If the child cannot be started.
     """
@@ -59,6 +61,7 @@ class Worker:
     def __init__(self, task: Task, limits: Limits | None = None) -> None:
         self._task = task
         self._limits = limits or Limits()
+        task.require_memory(self._limits.memory_mb)
         self._progress: Progress | None = None
         self._ending: list[str] | None = None  # empty where the work was done, else the kind of error and its sentence
         self._is_garbled = False

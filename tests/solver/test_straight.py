@@ -47,11 +47,25 @@ def test_a_chain_with_easing_meets_every_key() -> None:
     np.testing.assert_allclose(bake.frames[2], expected, atol=1e-15)
 
 
+@pytest.mark.parametrize("scale", [1e-89, 1e-30, 1e30, 1e89])
+def test_keys_of_any_size(scale: float) -> None:
+    shapes = {name: scale * shape for name, shape in SHAPES.items()}
+    task = Task.of_keys(shapes, FACES, NO_EDGES, ("a", "b"), Settings(mode="straight"), np.array([0.5]))
+    with np.errstate(all="raise", under="ignore"):
+        bake = finish(carry_out(task)).bake
+    assert bake is not None
+    assert bake.report["crossings"] == straight(("a", "b"), [0.5]).report["crossings"]
+
+
 def test_no_map_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tasks, "prepare", None)
     straight(("a", "b"), [0.5])
 
 
-def test_times_that_are_none_are_refused() -> None:
+@pytest.mark.parametrize("mode", ["straight", "natural", "linear"])
+@pytest.mark.parametrize("time", [1.5, float("nan")])
+def test_times_that_are_none_are_refused_before_any_work(mode: str, time: float) -> None:
+    settings = Settings(mode=mode)  # type: ignore[arg-type]
+    steps = carry_out(Task.of_keys(SHAPES, FACES, NO_EDGES, ("a", "b"), settings, np.array([time])))
     with pytest.raises(InputError, match="from 0"):
-        straight(("a", "b"), [1.5])
+        next(steps)

@@ -213,10 +213,21 @@ class TestTheRealChild:
         assert list(temporary.iterdir()) == []
 
     @pytest.mark.parametrize("megabytes", [1, 4, 16])
-    def test_out_of_memory_is_said_with_the_limit(self, temporary: Path, megabytes: int) -> None:
+    def test_out_of_memory_is_said_with_the_limit(
+        self, temporary: Path, megabytes: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(Task, "require_memory", lambda *_: None)  # as where the estimate is too low
         with pytest.raises(WorkerError, match=f"not enough memory within its limit of {megabytes} MB; use fewer") as e:
             client.run(small_task("fine"), None, Limits(memory_mb=megabytes))
         assert "allow it more in the add-on's preferences" in str(e.value)
+        assert list(temporary.iterdir()) == []
+
+    def test_too_large_a_task_is_refused_before_it_starts(
+        self, temporary: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(client.subprocess, "Popen", None)
+        with pytest.raises(InputError, match=r"The bake of 58 vertices needs about \d+ MB .* limit is 20 MB"):
+            client.run(small_task(), None, Limits(memory_mb=20))
         assert list(temporary.iterdir()) == []
 
     def test_killed_from_outside(self, temporary: Path) -> None:

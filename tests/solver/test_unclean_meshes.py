@@ -107,6 +107,8 @@ SIDES = np.unique(np.sort(FACES[:, [0, 1]], axis=1), axis=0)
 MIXED = np.where((np.arange(len(FACES)) % 3 == 0)[:, None], FACES[:, ::-1], FACES)
 FIN = np.array([[*FACES[10, :2], len(BAR)]])
 OPEN = FACES[(BAR[FACES].mean(axis=1)[:, 2] > 1e-9) & (BAR[FACES].mean(axis=1)[:, 0] < 0.49)]
+NEARLY_A_LINE = np.outer(np.arange(15), [-1.1797948846826836, 0.4755176467499659, 0.8469639000783107])
+FAR = np.array([[256.63, 102.35, 287.03], [809.26, 389.32, -719.44], [694.50, 428.95, -163.56]])
 TETRAHEDRON = np.concatenate([np.eye(3), np.zeros((1, 3))])
 NESTED = np.concatenate([BALL, 0.6 * BALL, 0.3 * BALL])
 BALLS = np.concatenate([BALL_FACES + number * len(BALL) for number in range(3)])
@@ -146,6 +148,11 @@ KINDS: dict[str, Keys] = {
     ),
     "four vertices": (TETRAHEDRON, TETRAHEDRON * [1.0, 1.0, -0.5], np.array([[0, 1, 2]])),
     "a tetrahedron": (TETRAHEDRON, moved(TETRAHEDRON), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])),
+    "a triangle with next to no area far from the rest": (
+        np.concatenate([NEARLY_A_LINE, FAR]),
+        np.concatenate([NEARLY_A_LINE * [-1, 1, 1] + [-2.478, 0.615, -0.181], FAR]),
+        np.array([[0, 1, 14]]),
+    ),
     "a part that stays": (
         np.concatenate([BAR, BAR + [3, 0, 0]]),
         np.concatenate([BENT, BAR + [3, 0, 0]]),

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from .errors import InputError
 from .tetmesh import Floats, Ints
 
-# Squares and cubes of what lies between still are numbers.
-_SMALLEST, LARGEST = 1e-90, 1e90
+# Cubes of what lies between, and squares of its areas, still are numbers.
+_SMALLEST, LARGEST = 1e-75, 1e75
 _MOST_GROWTH = 1e10
 
 

@@ -228,7 +228,7 @@ _KEYS: dict[str, Callable[[Array, Random], Array]] = {
 
 
 def _scaled(mesh: Mesh, random: Random) -> None:
-    factor = 10.0 ** _one_of(random, [-300, -160, -91, -90, -89, -38, -30, -6, 6, 30, 38, 89, 90, 91, 160, 300])
+    factor = 10.0 ** _one_of(random, [-300, -160, -76, -75, -74, -38, -30, -6, 6, 30, 38, 74, 75, 76, 160, 300])
     with np.errstate(all="ignore"):
         mesh.shapes = [shape * factor for shape in mesh.shapes]
 

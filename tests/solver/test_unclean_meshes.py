@@ -162,6 +162,8 @@ KINDS: dict[str, Keys] = {
     "huge": (1e6 * BAR, 1e6 * BENT, FACES),
     "very tiny": (1e-30 * BAR, 1e-30 * BENT, FACES),
     "very huge": (1e30 * BAR, 1e30 * moved(BENT), FACES),
+    "as tiny as may be": (1e-74 * BAR, 1e-74 * moved(BENT), FACES),
+    "as huge as may be": (1e74 * BAR, 1e74 * moved(BENT), FACES),
     "far away": (BAR + [3e4, 5e4, -1e4], BENT + [3e4, 5e4, -1e4], FACES),
     "far away, nothing still": (BAR + [3e4, 5e4, -1e4], moved(BENT) + [3e4, 5e4, -1e4], FACES),
     "moved far": (BAR, moved(BENT) + [3e4, 5e4, -1e4], FACES),

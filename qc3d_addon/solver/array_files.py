@@ -8,6 +8,7 @@ import math
 import os
 import shutil
 import stat
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
@@ -121,7 +122,7 @@ def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
         array: NDArray[np.generic] = archive[name]
     except KeyError:
         raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None
-    except (*_UNREADABLE, NotImplementedError) as error:
+    except _UNREADABLE as error:
         raise unreadable(f"The array {name} in {path}", error) from error
     return array
 
@@ -174,7 +175,10 @@ def _require_size(archive: zipfile.ZipFile, name: str) -> None:
         version = npy.read_magic(file)
         if version not in read_header:
             raise ValueError(f"it has version {version}, which is not known")
-        shape, _, dtype = read_header[version](file)
+        try:
+            shape, _, dtype = read_header[version](file)
+        except tokenize.TokenError as error:
+            raise ValueError("its header cannot be parsed") from error
         if dtype.hasobject:
             raise ValueError("it holds objects of Python, which are never read")
         if file.tell() + math.prod(shape) * dtype.itemsize != info.file_size:

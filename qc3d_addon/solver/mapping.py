@@ -96,7 +96,8 @@ def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
         raise InputError(f"A tetrahedron has a corner that is no vertex; there are {len(vertices)} vertices, from 0.")
     corners = corners.astype(np.int64)
     edges = edge_matrices(vertices, corners)
-    volumes = np.linalg.det(edges)
+    with np.errstate(divide="ignore", invalid="ignore"):  # flat ones are found below
+        volumes = np.linalg.det(edges)
     longest = np.linalg.norm(edges, axis=1).max(axis=1)
     flat = np.flatnonzero(~(np.abs(volumes) > _FLAT * longest**3))
     if flat.size:

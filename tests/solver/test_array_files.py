@@ -106,6 +106,17 @@ def test_objects_are_refused_by_their_header(tmp_path: Path) -> None:
         read_shapes(tmp_path / "pickle.npz")
 
 
+TEXTS = [b"{" * 5000, b"(" * 9000, b"", b"{'descr': __import__('os'), }", b"\xff", b"{'shape': 3}"]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_headers_that_are_none(text: bytes, tmp_path: Path) -> None:
+    entry = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    save(tmp_path / "odd.npz", "V0.npy", entry)
+    with pytest.raises(InputError, match=r"The array V0 in .* cannot be read: .*; export it again"):
+        read_shapes(tmp_path / "odd.npz")
+
+
 def test_names_that_would_control_a_terminal_are_shown_as_text(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_shapes(tmp_path / "new\nline\x1b[31m.npz")

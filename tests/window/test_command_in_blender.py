@@ -25,12 +25,13 @@ def test_ctrl_c_ends_the_command(root: Path, repository: Path) -> None:
             command,
             env=window._environment,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         ) as process:
-            window.wait(lambda: list(window.folder.glob("qc3d-*")), "the command fills the volume")
-            time.sleep(0.5)
+            assert process.stdout is not None
+            assert any("Read blend" in line for line in process.stdout)
+            time.sleep(1.0)
             process.send_signal(signal.SIGINT)
             said = process.communicate(timeout=60)[1]
         assert process.returncode == 130, said

@@ -34,7 +34,7 @@ def bend(points: Floats) -> Floats:
 
 
 class TestMapping:
-    @pytest.mark.parametrize(("size", "said"), [(1.2e-309, "are flat"), (1e-200, "are flat"), (1e200, "beyond 1e\\+75")])
+    @pytest.mark.parametrize(("size", "said"), [(1.2e-309, "flat"), (1e-200, "flat"), (1e200, "beyond 1e\\+75")])
     def test_sizes_that_numbers_cannot_hold(self, size: float, said: str) -> None:
         points = [[0.0, 0.0, 0.0], [size, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         with np.errstate(all="raise", under="ignore"), pytest.raises(InputError, match=said):

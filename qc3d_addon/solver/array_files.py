@@ -55,7 +55,7 @@ def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
         shape_names = read_array(archive, "shape_names", path)
         if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
-            raise InputError(f"shape_names in {path} must be a list of texts.")
+            raise InputError(f"shape_names in {path} must be a list of texts, a name for each shape.")
         known = shape_names.tolist()
         for name in names:
             if name not in known:

@@ -112,12 +112,12 @@ def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
 def _coordinates(values: ArrayLike, what: str) -> Floats:
     given = np.asarray(values)
     if given.dtype.kind not in "fiu":
-        raise InputError(f"The {what} must be numbers.")
+        raise InputError(f"The {what} must be numbers; three for each.")
     found = given.astype(np.float64)
     if found.ndim != 2 or found.shape[1] != 3:
         raise InputError(f"The {what} have the shape {found.shape}; (N, 3) is needed.")
     if not np.isfinite(found).all():
-        raise InputError(f"The {what} hold numbers that are not finite.")
+        raise InputError(f"The {what} hold numbers that are not finite; correct them first.")
     if np.abs(found).max(initial=0.0) > LARGEST:
         raise InputError(f"The {what} have coordinates beyond {LARGEST:.0e}; scale the mesh to below that.")
     return found

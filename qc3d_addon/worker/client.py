@@ -24,6 +24,7 @@ from ..solver.pipeline import STAGES, Progress
 from ..solver.private_folders import PrivateFolder
 from ..solver.task import Outcome, Task
 from .exchange import read_outcome, write_task
+from .idleness import LONGEST_IDLE, Idleness
 
 CHILD = Path(__file__).with_name("task_child.py")
 _LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may hold a scipy that is not the bundled one
@@ -80,6 +81,7 @@ class Worker:
         except BaseException:
             self._folder.close()
             raise
+        self._idleness = Idleness(self._process.pid)
         self._deadline = clock.monotonic() + self._limits.seconds
         self._reader = threading.Thread(target=self._read_messages, daemon=True)
         self._reader.start()
@@ -101,6 +103,9 @@ class Worker:
             if self._is_garbled:
                 self.close()
                 raise WorkerError(_GARBLED)
+            if self._idleness.lasts_too_long:
+                self.close()
+                raise WorkerError(_HANGS.format(LONGEST_IDLE))
             if clock.monotonic() > self._deadline:
                 self.close()
                 raise WorkerError(
@@ -196,6 +201,10 @@ class Worker:
 
 
 _NOT_STARTED = "The work cannot be started in a process of its own: {}; make room in the folder for temporary files."
+_HANGS = (
+    "The process that does the work has done nothing for {:g} s and was stopped; nothing was changed. Memory may have "
+    "run out: try again with a lower quality or fewer in-betweens."
+)
 _GARBLED = (
     "The process that does the work sent something that is no message of it and was stopped; nothing was changed. Try "
     "again, and report it if it happens again."

@@ -26,6 +26,8 @@ import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
+# What threads, SuperLU and Qhull say where they get none.
+_WORDS_OF_TOO_LITTLE_MEMORY = ("start new thread", "malloc", "memory")
 _NICE = 5  # the window that the user works in comes first
 
 
@@ -57,6 +59,10 @@ def main(arguments: list[str]) -> None:
     except errors.QC3DError as error:
         _send(messages, {"error": [type(error).__name__, str(error)]})
     except MemoryError:
+        _send(messages, {"error": ["MemoryError", ""]})
+    except RuntimeError as error:
+        if not any(word in str(error).lower() for word in _WORDS_OF_TOO_LITTLE_MEMORY):
+            raise
         _send(messages, {"error": ["MemoryError", ""]})
     else:
         _send(messages, {"done": True})

@@ -20,7 +20,7 @@ from qc3d_addon.solver.errors import InputError, MeshingError, QC3DError, Worker
 from qc3d_addon.solver.pipeline import Progress, evenly_spaced, finish
 from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.task import Task, carry_out
-from qc3d_addon.worker import client
+from qc3d_addon.worker import client, idleness
 from qc3d_addon.worker.client import Limits, Worker
 
 from ..solver.meshes import box_surface, twisted
@@ -182,6 +182,25 @@ def test_a_hung_child_is_stopped_after_its_time(stand_in: Path, temporary: Path,
     wait_until_gone(int(own.read_text()))
     wait_until_gone(int(below.read_text()))
     assert list(temporary.iterdir()) == []
+
+
+def test_a_child_that_does_nothing_more_is_stopped(
+    stand_in: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a thread got no memory to start with: the others wait for it forever."""
+    monkeypatch.setattr(idleness, "LONGEST_IDLE", 3.0)
+    play(stand_in, "time.sleep(600)")
+    assert "has done nothing for" in str(failure())
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_child_that_is_busy_or_lets_others_work_is_not(
+    stand_in: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(idleness, "LONGEST_IDLE", 2.0)
+    busy = "import time\nend = time.monotonic() + 5\nwhile time.monotonic() < end: pass"
+    play(stand_in, f"subprocess.run([sys.executable, '-c', {busy!r}])", busy, "os._exit(3)")
+    assert "exit status 3" in str(failure())
 
 
 def test_what_a_child_leaves_running_ends_with_it(stand_in: Path, temporary: Path, tmp_path: Path) -> None:

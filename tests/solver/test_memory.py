@@ -26,12 +26,12 @@ KEYS = ("Basis", "Up")
         (12, 7, "fine", 209),
         (12, 49, "normal", 99),
         (6890, 7, "draft", 110),
-        (6890, 7, "normal", 175),
+        (6890, 7, "normal", 208),
         (6890, 7, "fine", 238),
         (6890, 49, "normal", 203),
-        (27554, 7, "normal", 285),
-        (110210, 7, "normal", 809),
-        (440834, 7, "normal", 3080),
+        (27554, 7, "normal", 278),
+        (110210, 7, "normal", 844),
+        (440834, 7, "normal", 2861),
     ],
 )
 def test_the_estimate_is_above_what_was_measured_and_near_it(
@@ -39,7 +39,7 @@ def test_the_estimate_is_above_what_was_measured_and_near_it(
 ) -> None:
     estimate = estimated_mb(vertices, 1, frames, quality)  # type: ignore[arg-type]
     assert measured <= estimate * 1.02
-    assert estimate <= 1.5 * measured
+    assert estimate <= 1.3 * measured + 60.0
 
 
 def test_a_hundred_thousand_vertices_need_less_than_4_gb() -> None:

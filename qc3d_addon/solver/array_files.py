@@ -98,13 +98,12 @@ def open_archive(path: Path, needed: str) -> Iterator[NpzFile]:
     require_file(path)
     with ExitStack() as stack:
         try:
-            archive = np.load(stack.enter_context(path.open("rb")), allow_pickle=False)
+            # Not np.load: it would read any other file of numpy whole before it could be refused.
+            archive = NpzFile(stack.enter_context(path.open("rb")), allow_pickle=False)
         except OSError as error:
             raise unreadable(path, error) from error
-        except _UNREADABLE:
-            archive = None
-        if not isinstance(archive, NpzFile):
-            raise InputError(f"{path} is not an .npz file of arrays; {needed}.")
+        except _UNREADABLE as error:
+            raise InputError(f"{path} is not an .npz file of arrays; {needed}.") from error
         yield stack.enter_context(archive)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from .runner import KINDS, MOST_SECONDS, run_cases
 
-CASES = {"mesh": 40, "file": 250}
+CASES = {"mesh": 40, "file": 200}
 SEED = 20 if "CI" in os.environ else int.from_bytes(os.urandom(4), "big")
 
 

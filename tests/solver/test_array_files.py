@@ -117,6 +117,16 @@ def test_headers_that_are_none(text: bytes, tmp_path: Path) -> None:
         read_shapes(tmp_path / "odd.npz")
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999,), }", "{'descr': '<f8'\\\n", "", "((((("],
+)
+def test_a_single_array_is_not_even_looked_into(text: str, tmp_path: Path) -> None:
+    (tmp_path / "odd.npz").write_bytes(b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode())
+    with pytest.raises(InputError, match=r"is not an \.npz file of arrays; faces, shape_names"):
+        read_shapes(tmp_path / "odd.npz")
+
+
 def test_names_that_would_control_a_terminal_are_shown_as_text(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_shapes(tmp_path / "new\nline\x1b[31m.npz")

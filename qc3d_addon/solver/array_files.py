@@ -99,7 +99,8 @@ def open_archive(path: Path, needed: str) -> Iterator[NpzFile]:
     with ExitStack() as stack:
         try:
             # Not np.load: it would read any other file of numpy whole before it could be refused.
-            archive = NpzFile(stack.enter_context(path.open("rb")), allow_pickle=False)
+            file: Any = stack.enter_context(path.open("rb"))  # numpy's types expect a text file in some versions
+            archive = NpzFile(file, allow_pickle=False)
         except OSError as error:
             raise unreadable(path, error) from error
         except _UNREADABLE as error:
@@ -117,7 +118,8 @@ def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
     """
     try:
         if name in archive.files:
-            _require_size(archive.zip, f"{name}.npy")  # type: ignore[arg-type]
+            assert archive.zip is not None
+            _require_size(archive.zip, f"{name}.npy")
         array: NDArray[np.generic] = archive[name]
     except KeyError:
         raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None

@@ -83,7 +83,7 @@ def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
     corners = key[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
-    return np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest)
+    return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
 
 
 def gradient_operator(faces: Ints, gradients: Floats, count: int) -> csr_array:

@@ -4,7 +4,6 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-import sys
 from typing import TYPE_CHECKING
 
 import bpy
@@ -31,7 +30,8 @@ class QC3DPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: IntProperty(
         name="Memory Limit",
-        description="Megabytes that a bake may allocate, on Linux; 0 for three quarters of the machine's memory",
+        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is not "
+        "started, and on Linux stopped",
         default=0,
         min=0,
         max=10_000_000,
@@ -41,9 +41,7 @@ class QC3DPreferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "time_limit", text="Time Limit (Minutes)")
-        row = layout.row()
-        row.active = sys.platform == "linux"
-        row.prop(self, "memory_limit", text="Memory Limit (MB)")
+        layout.prop(self, "memory_limit", text="Memory Limit (MB)")
 
 
 def limits(context: bpy.types.Context) -> "Limits":

@@ -30,8 +30,8 @@ class QC3DPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: IntProperty(
         name="Memory Limit",
-        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is not "
-        "started, and on Linux stopped",
+        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is "
+        "not started, and on Linux stopped",
         default=0,
         min=0,
         max=10_000_000,

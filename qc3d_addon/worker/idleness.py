@@ -9,7 +9,7 @@ from pathlib import Path
 
 # Even a machine with far too much to do gives a process its turn in this time.
 LONGEST_IDLE = 120.0
-_PAUSE = 1.0
+_PAUSE = 10.0  # between looks, each of which takes some milliseconds
 
 
 class Idleness:

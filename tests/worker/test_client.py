@@ -189,6 +189,7 @@ def test_a_child_that_does_nothing_more_is_stopped(
 ) -> None:
     """As where a thread got no memory to start with: the others wait for it forever."""
     monkeypatch.setattr(idleness, "LONGEST_IDLE", 3.0)
+    monkeypatch.setattr(idleness, "_PAUSE", 1.0)
     play(stand_in, "time.sleep(600)")
     assert "has done nothing for" in str(failure())
     assert list(temporary.iterdir()) == []
@@ -198,6 +199,7 @@ def test_a_child_that_is_busy_or_lets_others_work_is_not(
     stand_in: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(idleness, "LONGEST_IDLE", 2.0)
+    monkeypatch.setattr(idleness, "_PAUSE", 0.5)
     busy = "import time\nend = time.monotonic() + 5\nwhile time.monotonic() < end: pass"
     play(stand_in, f"subprocess.run([sys.executable, '-c', {busy!r}])", busy, "os._exit(3)")
     assert "exit status 3" in str(failure())

@@ -128,7 +128,7 @@ def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
     return array
 
 
-def require_file(path: Path) -> None:
+def require_file(path: Path, most: int = MOST_BYTES) -> None:
     """Check a name before it is opened: pipes and devices may never end.
 
     Raises
@@ -142,8 +142,8 @@ def require_file(path: Path) -> None:
         raise unreadable(path, error) from error
     if not stat.S_ISREG(found.st_mode):
         raise InputError(f"{path} is no file that can be read; name a file.")
-    if found.st_size > MOST_BYTES:
-        raise InputError(f"{path} has {found.st_size} bytes, and at most {MOST_BYTES} are read; make it smaller.")
+    if found.st_size > most:
+        raise InputError(f"{path} has {found.st_size} bytes, and at most {most} are read; make it smaller.")
 
 
 def unreadable(what: Path | str, error: BaseException) -> InputError:

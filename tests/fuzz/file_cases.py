@@ -23,9 +23,8 @@ from numpy.lib import format as npy
 from qc3d_addon.commands.reconstruct import read_landmarks
 from qc3d_addon.solver import compressed_files, map_files, storage
 from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.compression import Codec
+from qc3d_addon.solver.compression import Compressed
 from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.mapping import Mapping
 from qc3d_addon.solver.mapping_files import TetFile, read_tets, write_tets
 from qc3d_addon.solver.prepared import PreparedMap
 from qc3d_addon.solver.settings import Settings
@@ -126,9 +125,15 @@ def _maps() -> bytes:
 
 @cache
 def _spectral() -> bytes:
-    mesh = _mesh()
-    found = Codec(mesh, 6).compress(Mapping(mesh, _moved()), 6, 1e-3)
-    return compressed_files.to_bytes(mesh, compressed_files.CompressedMaps(6, (found,)))
+    random = np.random.default_rng(0)
+    numbers, rest = random.integers(-9, 10, size=(2, 6, 6)), random.integers(-2, 3, size=(2, len(_mesh().points), 3))
+    compressed = Compressed("fitted", "sliding", 0.01, numbers, np.empty((2, 0, 3)), 0.25, 0.002, rest)
+    content = compressed_files.Content(6, compressed, (1.0, 2.0, 3.0, 0.5))
+    return compressed_files.to_bytes(_source(), content)
+
+
+def _source() -> compressed_files.Source:
+    return compressed_files.Source("maps", _mesh().points, _mesh().tets)
 
 
 def _tets(ending: str) -> Callable[[], bytes]:
@@ -173,7 +178,7 @@ def _read_stored(path: Path) -> None:
 
 
 def _read_compressed(path: Path) -> None:
-    compressed_files.read_compressed(path, _mesh())
+    compressed_files.read_compressed(path, _source())
 
 
 _FORMATS: dict[str, tuple[str, Callable[[], bytes], Callable[[Path], None]]] = {

@@ -17,7 +17,7 @@ from numpy.lib import format as npy
 
 from qc3d_addon.commands.reconstruct import read_landmarks
 from qc3d_addon.solver.array_files import read_pairs, replacing_all
-from qc3d_addon.solver.compressed_files import read_compressed
+from qc3d_addon.solver.compressed_files import Source, read_compressed
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.map_files import read_maps
 from qc3d_addon.solver.mapping_files import read_tets
@@ -38,7 +38,7 @@ READERS: list[Callable[[Path], object]] = [
     lambda path: read_tets(path.with_suffix(".vtu")),
     read_maps,
     read_landmarks,
-    lambda path: read_compressed(path, kuhn_grid(1)),
+    lambda path: read_compressed(path, Source("maps", kuhn_grid(1).points, kuhn_grid(1).tets)),
 ]
 
 
@@ -76,7 +76,7 @@ class TestWhatIsNoFile:
                 file.truncate(2**31 + 1)  # takes no room: nothing is in it
 
         path = self.both(tmp_path, make)
-        with pytest.raises(InputError, match="has 2147483649 bytes, and at most 2147483648 are read"):
+        with pytest.raises(InputError, match=r"has 2147483649 bytes, and at most \d+ are read"):
             read(path)
 
 

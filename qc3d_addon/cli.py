@@ -9,7 +9,6 @@ import json
 import sys
 import tomllib
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
@@ -18,9 +17,15 @@ from typing import NoReturn
 from .commands import analyze, compress, reconstruct, reproduce
 from .commands.options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
-from .solver.array_files import read_pairs, replacing, write_frames
-from .solver.errors import InputError, QC3DError, naming_pair
-from .solver.pipeline import chain_inbetweens, evenly_spaced, finish, prepare
+from .solver.array_files import read_pairs, replacing_all, write_frames
+from .solver.errors import InputError, QC3DError, naming_pair, on_one_line
+from .solver.keypair import KeyPair
+from .solver.memory import machine_limit_mb
+from .solver.pipeline import Bake, Steps, chain_inbetweens, evenly_spaced, finish, prepare
+from .solver.settings import Settings
+from .solver.straight import straight_inbetweens
+from .solver.task import Task
+from .solver.tetmesh import Floats
 
 MOST_FRAMES = 10_000
 
@@ -53,22 +58,28 @@ def _interpolate(arguments: argparse.Namespace) -> None:
     names = _key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * len(pairs) - 1)
-    with ExitStack() as stack:
-        output = stack.enter_context(replacing(arguments.output))
-        report = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
+    Task(dict(zip(pairwise(names), pairs, strict=True)), names, settings, times).require_memory(machine_limit_mb())
+    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    with replacing_all(*files) as (output, *reports):
         with StageBars() as bars:
-            prepared = []
-            for pair, ends in zip(pairs, pairwise(names), strict=True):
-                with naming_pair(*ends, names):
-                    prepared.append(finish(prepare(pair, settings), bars))
-            bake = finish(chain_inbetweens(prepared, times, settings), bars)
+            bake = finish(_inbetweens(pairs, names, times, settings), bars)
         try:
             write_frames(output, pairs, bake.times, bake.frames)
-            if report is not None:
+            for report in reports:
                 report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
     _print_notes(bake.report["notes"])
+
+
+def _inbetweens(pairs: Sequence[KeyPair], names: Sequence[str], times: Floats, settings: Settings) -> Steps[Bake]:
+    if settings.mode == "straight":
+        return (yield from straight_inbetweens(pairs, times, settings))
+    prepared = []
+    for pair, ends in zip(pairs, pairwise(names), strict=True):
+        with naming_pair(*ends, names):
+            prepared.append((yield from prepare(pair, settings)))
+    return (yield from chain_inbetweens(prepared, times, settings))
 
 
 def _bake(arguments: argparse.Namespace) -> None:
@@ -93,7 +104,7 @@ def _bake(arguments: argparse.Namespace) -> None:
 
 def _print_notes(notes: Iterable[str]) -> None:
     for note in notes:
-        print(f"qc3d: {note}", file=sys.stderr)
+        print(f"qc3d: {on_one_line(note)}", file=sys.stderr)
 
 
 def _key_names(arguments: argparse.Namespace) -> tuple[str, ...]:

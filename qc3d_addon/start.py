@@ -5,13 +5,19 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 
 
 def main() -> int:
-    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main`."""
-    one_thread_each()
-    from .cli import main as run
-
+    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main`. A request to end is treated as Ctrl-C is."""
+    try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        one_thread_each()
+        from .cli import main as run  # loading the libraries takes a while, in which Ctrl-C may come
+    except KeyboardInterrupt:
+        print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
+        return 130
     return run()
 
 

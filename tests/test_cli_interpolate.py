@@ -85,16 +85,32 @@ def test_a_chain_runs_through_every_key(bar: dict[str, np.ndarray], tmp_path: Pa
 
 
 def test_the_notes_are_those_of_the_report(
-    bar: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    bar_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A mirrored key is out of reach of any map without folds, which only the frames' part of the work tells."""
-    np.savez(tmp_path / "mirrored.npz", **(bar | {"V1": bar["V0"] * [-1.0, 1.0, 1.0]}))
+    """A turn asked for that no part can take is said in the report, and to the user."""
     report = tmp_path / "report.json"
-    options = ["--mode", "linear", "--report", str(report)]
-    assert interpolate(tmp_path / "mirrored.npz", tmp_path / "frames.npz", *options) == 0
+    options = ["--extra-turns", "1", "--report", str(report)]
+    assert interpolate(bar_file, tmp_path / "frames.npz", *options) == 0
     notes = json.loads(report.read_text())["notes"]
     assert notes
     assert capsys.readouterr().err == "".join(f"qc3d: {note}\n" for note in notes)
+
+
+def test_a_mirrored_key_is_refused_and_blends_straight(
+    bar: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mirrored = bar["V0"] * [-1.0, 1.0, 1.0] + [0.5, 0.0, 0.0]
+    np.savez(tmp_path / "mirrored.npz", **(bar | {"V1": mirrored}))
+    assert interpolate(tmp_path / "mirrored.npz", tmp_path / "frames.npz") == 2
+    assert "mirrored or turned inside out" in refusal(capsys)
+    assert not (tmp_path / "frames.npz").exists()
+    report = tmp_path / "report.json"
+    options = ["--mode", "straight", "--report", str(report)]
+    assert interpolate(tmp_path / "mirrored.npz", tmp_path / "frames.npz", *options) == 0
+    with np.load(tmp_path / "frames.npz") as stored:
+        halfway = bar["V0"] + 0.5 * (mirrored - bar["V0"])
+        np.testing.assert_array_equal(stored["frames"], [bar["V0"], halfway, mirrored])
+    assert json.loads(report.read_text())["engine"] == "none"
 
 
 def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,10 +34,12 @@ def bake_object(
         If the object, the keys or the settings cannot be used; the object is as it was.
     """
     # Imported where it is used: scipy would make Blender start slower.
+    from ..solver.memory import machine_limit_mb
     from ..solver.pipeline import finish
     from ..solver.task import carry_out
 
     plan = plan_bake(obj, request)
+    plan.task.require_memory(machine_limit_mb())
     return write_bake(plan, finish(carry_out(plan.task), on_progress))
 
 
@@ -72,21 +73,19 @@ def bake_file(
     QC3DError
         If a file, the object, the keys or the settings cannot be used; no file is written.
     """
-    from ..solver.array_files import replacing
+    from ..solver.array_files import replacing_all
 
     _open(path)
     obj = bpy.data.objects.get(object_name)
     if obj is None:
         meshes = ", ".join(f"'{other.name}'" for other in bpy.data.objects if other.type == 'MESH') or "none"
         raise InputError(f"{path} has no object '{object_name}'; its meshes: {meshes}.")
-    with ExitStack() as stack:
-        # Opened before the work starts, so that a folder that cannot be written to is found out first.
-        unfinished = stack.enter_context(replacing(output))
-        unfinished_report = None if report is None else stack.enter_context(replacing(report))
+    # Opened before the work starts, so that a folder that cannot be written to is found out first.
+    with replacing_all(output, *([] if report is None else [report])) as (unfinished, *unfinished_reports):
         result = bake_object(obj, request, on_progress)
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(unfinished), copy=True, check_existing=False)
-            if unfinished_report is not None:
+            for unfinished_report in unfinished_reports:
                 unfinished_report.write_text(json.dumps(result.report, indent=1) + "\n", encoding="utf-8")
         except (OSError, RuntimeError) as error:
             raise InputError(f"The results cannot be written: {error}.") from error

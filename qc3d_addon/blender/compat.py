@@ -4,9 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import bpy
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt: without its window Blender keeps it for itself, and a second one kills it."""
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        # None where the handler is Blender's own, which Python cannot put back; then the next Ctrl-C ends Blender.
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 def register_command(name: str, handler: Callable[[list[str]], int]) -> list[object]:

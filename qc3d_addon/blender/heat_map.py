@@ -83,8 +83,12 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
 def refresh(obj: bpy.types.Object, chain: Chain) -> None:
     """Show what a new bake of the chain measured, where the heat map of that chain is shown."""
     state = shown(obj)
-    if state is not None and state.slider == chain.slider:
+    if state is None or state.slider != chain.slider:
+        return
+    if kept_measures.has(obj.data.shape_keys, chain.slider):
         show(obj, chain, state.measure)
+    else:  # a straight blend has none
+        hide(obj)
 
 
 def hide(obj: bpy.types.Object) -> None:

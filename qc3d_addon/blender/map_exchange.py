@@ -32,6 +32,8 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     keys = checks.require_object(obj).data.shape_keys
     record = Record.read(keys)
     settings = request_again(obj, chain).settings
+    if settings.mode == "straight":
+        raise InputError("A straight blend is made without a map; bake in another mode to have one.")
     maps = {}
     for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
         data = record.kept_map(keys, kept_map(ends, pair, settings))

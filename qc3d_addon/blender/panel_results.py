@@ -92,8 +92,11 @@ def _draw_chain(
             text=", ".join(problems) or f"No {', no '.join(looked_for.values())}",
             icon='ERROR' if problems else 'CHECKMARK',
         )
-        facts.label(text=f"Fitted within {result['residual']:.2%} of the size")
-        facts.label(text=f"Engine {result['engine']}")
+        if result["residual"] is None:
+            facts.label(text="Straight blend, without a map")
+        else:
+            facts.label(text=f"Fitted within {result['residual']:.2%} of the size")
+            facts.label(text=f"Engine {result['engine']}")
         _draw_distortion(layout, obj, chain)
         for note in result["notes"]:
             draw_sentence(context, layout, note)

@@ -197,7 +197,10 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     chain.request, chain.mirror_of = request.remembered(), ""
     chain.result = _result(report, bake.times, chosen)
     measures = {name: values[chosen] for name, values in bake.measures.items()}
-    kept_measures.keep(keys, chain.slider, measures)
+    if measures:
+        kept_measures.keep(keys, chain.slider, measures)
+    else:
+        kept_measures.forget(keys, chain.slider)
     record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
     _keep_maps(keys, record, plan, outcome)
     record.write(keys)
@@ -239,11 +242,11 @@ def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[
         "count": len(chosen) - 2,
         "engine": report["engine"],
         "seconds": sum(report["seconds"].values()),
-        "folds": sum(report["folds"]["frames"][step] for step in chosen),
+        "folds": _summed(report["folds"]["frames"], chosen),
         "crossings": sum(report["crossings"][step] for step in chosen),
         "collider_crossings": _summed(report.get("collider_crossings"), chosen),
         "worst": {"excess": worst["excess"], "at": float(times[worst["frame"]]), "vertex": worst["vertex"]},
-        "residual": report["residual"]["rms"],
+        "residual": report["residual"] and report["residual"]["rms"],
         "notes": report["notes"],
     }
 

@@ -4,8 +4,6 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-import os
-import sys
 from typing import TYPE_CHECKING
 
 import bpy
@@ -16,7 +14,6 @@ if TYPE_CHECKING:
 
 _PACKAGE = __package__.rpartition(".")[0]  # what Blender knows the add-on by
 _MINUTES = 60
-_SHARE_OF_MEMORY = 0.75
 
 
 class QC3DPreferences(bpy.types.AddonPreferences):
@@ -33,7 +30,8 @@ class QC3DPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: IntProperty(
         name="Memory Limit",
-        description="Megabytes that a bake may allocate, on Linux; 0 for three quarters of the machine's memory",
+        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is "
+        "not started, and on Linux stopped",
         default=0,
         min=0,
         max=10_000_000,
@@ -43,25 +41,16 @@ class QC3DPreferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "time_limit", text="Time Limit (Minutes)")
-        row = layout.row()
-        row.active = sys.platform == "linux"
-        row.prop(self, "memory_limit", text="Memory Limit (MB)")
+        layout.prop(self, "memory_limit", text="Memory Limit (MB)")
 
 
 def limits(context: bpy.types.Context) -> "Limits":
     """What the child process may use."""
+    from ..solver.memory import machine_limit_mb
     from ..worker.client import Limits
 
     addon = context.preferences.addons.get(_PACKAGE)
     chosen = None if addon is None else addon.preferences
     minutes = _MINUTES if chosen is None else chosen.time_limit
     memory = 0 if chosen is None else chosen.memory_limit
-    return Limits(60.0 * minutes, memory or _automatic_memory())
-
-
-def _automatic_memory() -> int:
-    try:
-        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
-        return 0
-    return int(_SHARE_OF_MEMORY * total / 2**20)
+    return Limits(60.0 * minutes, memory or machine_limit_mb())

@@ -23,6 +23,7 @@ _DESCRIPTIONS = {
     "mode": {
         "natural": "Rotations, lengths and volumes are kept",
         "linear": "The stretch of the volume is interpolated linearly, as published",
+        "straight": "Straight lines, without a map: for keys that are mirrored or turned inside out",
     },
     "stretch": {
         "linear": "Lengths grow by equal amounts",

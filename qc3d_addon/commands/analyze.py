@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +16,7 @@ import numpy as np
 
 from ..progress_bars import StageBars
 from ..solver.analysis import Analysis
-from ..solver.array_files import read_pairs, replacing
+from ..solver.array_files import read_pairs, replacing_all
 from ..solver.errors import InputError
 from ..solver.mapping import Mapping
 from ..solver.mapping_files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
@@ -61,11 +63,25 @@ def _run(arguments: argparse.Namespace) -> None:
     else:
         mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
     analysis = Analysis(mapping)
+    with _folder(arguments.output):
+        _write(analysis, prepared, arguments.output, arguments.format)
+
+
+@contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """Make a folder where there is none; leaving by an error removes it again."""
+    is_new = not path.exists()
     try:
-        arguments.output.mkdir(parents=True, exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{arguments.output} cannot be made a folder: {error.strerror or error}.") from error
-    _write(analysis, prepared, arguments.output, arguments.format)
+        raise InputError(f"{path} cannot be made a folder: {error.strerror or error}.") from error
+    try:
+        yield
+    except BaseException:
+        if is_new:
+            with suppress(OSError):
+                path.rmdir()
+        raise
 
 
 def _write(analysis: Analysis, prepared: PreparedMap | None, folder: Path, ending: str) -> None:
@@ -73,26 +89,28 @@ def _write(analysis: Analysis, prepared: PreparedMap | None, folder: Path, endin
     from ..figures.surfaces import save_distortion
 
     summary = analysis.summary()
-    write_tets(folder / f"mapping.{ending}", _with_attributes(analysis))
-    if prepared is not None:
-        measures = VertexMeasures([prepared]).of(0, prepared.pair.key1, prepared.mapped)
-        summary["surface"] = {
-            "vertices": len(prepared.pair.key0),
-            "landmark_residual": prepared.landmark_residual(),
-            **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
-        }
-        with replacing(folder / "surface.npz") as unfinished, unfinished.open("wb") as file:
-            arrays: dict[str, Any] = dict(measures)
-            pair = prepared.pair
-            np.savez_compressed(file, faces=pair.faces, key0=pair.key0, key1=pair.key1, **arrays)
-        with replacing(folder / "surface.png") as unfinished:
-            save_distortion(prepared.pair, measures, unfinished)
-    with replacing(folder / "histograms.png") as unfinished:
-        save_histograms(analysis, unfinished)
-    with replacing(folder / "slices.png") as unfinished:
-        save_slices(analysis, unfinished)
-    with replacing(folder / "summary.json") as unfinished:
-        unfinished.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    names = [f"mapping.{ending}", "histograms.png", "slices.png", "summary.json"]
+    names += [] if prepared is None else ["surface.npz", "surface.png"]
+    with replacing_all(*(folder / name for name in names)) as (mapping, histograms, slices, text, *surface):
+        write_tets(mapping, _with_attributes(analysis))
+        try:
+            save_histograms(analysis, histograms)
+            save_slices(analysis, slices)
+            if prepared is not None:
+                pair = prepared.pair
+                measures = VertexMeasures([prepared]).of(0, pair.key1, prepared.mapped)
+                summary["surface"] = {
+                    "vertices": len(pair.key0),
+                    "landmark_residual": prepared.landmark_residual(),
+                    **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
+                }
+                arrays: dict[str, Any] = dict(measures)
+                with surface[0].open("wb") as file:
+                    np.savez_compressed(file, faces=pair.faces, key0=pair.key0, key1=pair.key1, **arrays)
+                save_distortion(pair, measures, surface[1])
+            text.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{folder} cannot be written to: {error.strerror or error}; nothing was.") from error
 
 
 def _with_attributes(analysis: Analysis) -> TetFile:

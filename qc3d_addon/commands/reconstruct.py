@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..solver.array_files import require_file, unreadable
 from ..solver.conditions import Conditions
 from ..solver.errors import InputError
 from ..solver.mapping_files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
@@ -94,15 +95,17 @@ def _conditions(arguments: argparse.Namespace, content: TetFile, mesh: TetMesh) 
         conditions = Conditions.none(mesh)
     if arguments.landmarks is None:
         return conditions
-    return conditions.with_landmarks(*_read_landmarks(arguments.landmarks))
+    return conditions.with_landmarks(*read_landmarks(arguments.landmarks))
 
 
-def _read_landmarks(path: Path) -> tuple[list[int], list[list[float]]]:
+def read_landmarks(path: Path) -> tuple[list[int], list[list[float]]]:
+    """Vertices and their places, NaN where a coordinate is free, of a table; raises InputError where it is none."""
+    require_file(path)
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} cannot be read: {error}.") from error
+        raise unreadable(path, error) from error
     if not rows or [cell.strip() for cell in rows[0]] != _HEADER:
         raise InputError(f"{path} must begin with the row {','.join(_HEADER)}.")
     vertices, values = [], []
@@ -116,7 +119,7 @@ def _read_landmarks(path: Path) -> tuple[list[int], list[list[float]]]:
             if len(cells) != 3:
                 raise ValueError("four cells are needed")
         except ValueError as error:
-            raise InputError(f"{path}, row {number}: {error}.") from error
+            raise InputError(f"{path}, row {number}: {error}; correct the row.") from error
     if not vertices:
-        raise InputError(f"{path} names no landmarks.")
+        raise InputError(f"{path} names no landmarks; give a row for each.")
     return vertices, values

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from .array_files import replacing
+from .array_files import replacing, require_file, unreadable
 from .compression import Boundary, Compressed, Scheme
 from .errors import InputError
 from .prediction import Predictor
@@ -220,10 +220,9 @@ def write_compressed(path: Path, data: bytes) -> None:
 
 def read_compressed(path: Path, source: Source) -> Content:
     """Read a file of compressed maps; raises InputError if it cannot be read or is something else."""
+    require_file(path, _MOST_BYTES)
     try:
-        size = path.stat().st_size
-        if size > _MOST_BYTES:
-            raise InputError(f"{path} has {size} bytes, more than compressed maps ever have.")
-        return from_bytes(path.read_bytes(), source)
+        data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        raise unreadable(path, error) from error
+    return from_bytes(data, source)

@@ -7,9 +7,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+_LONGEST = 1000
+
 
 class QC3DError(Exception):
-    """Base of every error that QC3D raises on purpose; its text is meant for the user."""
+    """Base of every error that QC3D raises on purpose; its text is meant for the user, on one line."""
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(on_one_line(sentence))
 
 
 class InputError(QC3DError):
@@ -26,6 +31,15 @@ class WorkerError(QC3DError):
 
 class ReconstructionError(QC3DError):
     """A map cannot be rebuilt from its representation and boundary conditions."""
+
+
+def on_one_line(text: str) -> str:
+    """Text that may hold names from files, as a terminal or Blender can show it: nothing that controls them.
+
+    What cannot be printed is written as Python writes it, such as ``\\n``; the middle of a very long text is left out.
+    """
+    shown = "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
+    return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST // 2]} … {shown[-_LONGEST // 2 :]}"
 
 
 @contextmanager

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from .errors import InputError
 from .tetmesh import Floats, Ints
 
-# Squares and cubes of what lies between still are numbers.
-_SMALLEST, _LARGEST = 1e-90, 1e90
+# Cubes of what lies between, and squares of its areas, still are numbers.
+_SMALLEST, LARGEST = 1e-75, 1e75
 _MOST_GROWTH = 1e10
 
 
@@ -68,7 +68,13 @@ class KeyPair:
 
 
 def _positions(key: ArrayLike, name: str) -> Floats:
-    positions = np.array(key, dtype=np.float64)
+    try:
+        given = np.asarray(key)
+        positions = np.array(given, dtype=np.float64) if given.dtype.kind in "fiuO" else None
+    except (TypeError, ValueError, OverflowError):
+        positions = None
+    if positions is None:
+        raise InputError(f"The {name} key does not hold numbers; positions must be an (n, 3) array of them.")
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise InputError(f"The {name} key has shape {positions.shape}; positions must be an (n, 3) array.")
     bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
@@ -78,8 +84,8 @@ def _positions(key: ArrayLike, name: str) -> Floats:
             f"({bad.size} such vertices); repair the key first."
         )
     largest = float(np.abs(positions).max(initial=0.0))
-    if largest > _LARGEST:
-        raise InputError(f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {_LARGEST:.0e}.")
+    if largest > LARGEST:
+        raise InputError(f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {LARGEST:.0e}.")
     return positions
 
 
@@ -106,7 +112,10 @@ def _require_like_sizes(first: Floats, second: Floats) -> None:
 
 
 def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:
-    indices = np.array(values)
+    try:
+        indices = np.array(values)
+    except ValueError as error:
+        raise InputError(f"{name} has rows of different lengths; it must be an (m, {width}) array.") from error
     if indices.ndim != 2 or indices.shape[1] != width:
         raise InputError(f"{name} has shape {indices.shape}; it must be an (m, {width}) array of vertex indices.")
     if indices.size and indices.dtype.kind not in "iu":

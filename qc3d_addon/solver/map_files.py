@@ -15,13 +15,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from .array_files import replacing
+from .array_files import replacing, require_file, unreadable
 from .errors import InputError
 from .settings import OF_THE_FIT, Settings
 
 _FIXED = struct.Struct("<8sHI")  # magic, version, bytes of the header
 _MAGIC, _VERSION = b"QC3DMAPS", 1
-_MOST_BYTES = 2**31
 _MOST_HEADER = 2**20
 
 
@@ -70,24 +69,23 @@ def read_maps(path: Path) -> KeptMaps:
     InputError
         If the file cannot be read, is damaged, of another version, or something else.
     """
+    require_file(path)
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path} is larger than maps ever are.")
         data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        raise unreadable(path, error) from error
     if len(data) < _FIXED.size or data[: len(_MAGIC)] != _MAGIC:
-        raise InputError(f"{path} is not a file of maps between shape keys.")
+        raise InputError(f"{path} is not a file of maps between shape keys; name one that Save Map wrote.")
     _, version, length = _FIXED.unpack_from(data)
     if version != _VERSION:
-        raise InputError(f"{path} has version {version}; this program reads version {_VERSION}.")
+        raise InputError(f"{path} has version {version}; this program reads version {_VERSION}; save the map again.")
     if length > min(_MOST_HEADER, len(data) - _FIXED.size):
-        raise InputError(f"{path} is damaged: it ends too early.")
+        raise InputError(f"{path} is damaged: it ends too early; save the map again.")
     body = data[_FIXED.size + length :]
     through, settings, sizes = _header(data[_FIXED.size : _FIXED.size + length], path)
     ends = list(dict.fromkeys(pairwise(through)))
     if len(sizes) != len(ends) or min(sizes) < 0 or sum(sizes) != len(body):
-        raise InputError(f"{path} is damaged: the sizes of its maps do not fit.")
+        raise InputError(f"{path} is damaged: the sizes of its maps do not fit; save the map again.")
     maps, start = {}, 0
     for pair, size in zip(ends, sizes, strict=True):
         maps[pair] = body[start : start + size]
@@ -101,7 +99,7 @@ def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], Settings, list[in
         through, sizes, chosen = header["through"], header["sizes"], header["settings"]
         settings = Settings(**{name: chosen[name] for name in OF_THE_FIT})
     except (ValueError, KeyError, TypeError, RecursionError, InputError) as error:
-        raise InputError(f"{path} is damaged: its header cannot be read.") from error
+        raise InputError(f"{path} is damaged: its header cannot be read; save the map again.") from error
     sound = (
         isinstance(through, list)
         and len(through) >= 2
@@ -111,5 +109,5 @@ def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], Settings, list[in
         and settings.seed < 2**31
     )
     if not sound:
-        raise InputError(f"{path} is damaged: its header makes no sense.")
+        raise InputError(f"{path} is damaged: its header makes no sense; save the map again.")
     return tuple(through), settings, sizes

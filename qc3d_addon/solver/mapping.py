@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
+from .keypair import LARGEST
 from .representation import polar_decomposition
 from .rotations import determinants
 from .tetmesh import Floats, TetMesh, edge_matrices
@@ -95,7 +96,8 @@ def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
         raise InputError(f"A tetrahedron has a corner that is no vertex; there are {len(vertices)} vertices, from 0.")
     corners = corners.astype(np.int64)
     edges = edge_matrices(vertices, corners)
-    volumes = np.linalg.det(edges)
+    with np.errstate(divide="ignore", invalid="ignore"):  # flat ones are found below
+        volumes = np.linalg.det(edges)
     longest = np.linalg.norm(edges, axis=1).max(axis=1)
     flat = np.flatnonzero(~(np.abs(volumes) > _FLAT * longest**3))
     if flat.size:
@@ -108,12 +110,14 @@ def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
 
 
 def _coordinates(values: ArrayLike, what: str) -> Floats:
-    try:
-        found = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {what} must be numbers.") from error
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiu":
+        raise InputError(f"The {what} must be numbers; three for each.")
+    found = given.astype(np.float64)
     if found.ndim != 2 or found.shape[1] != 3:
         raise InputError(f"The {what} have the shape {found.shape}; (N, 3) is needed.")
     if not np.isfinite(found).all():
-        raise InputError(f"The {what} hold numbers that are not finite.")
+        raise InputError(f"The {what} hold numbers that are not finite; correct them first.")
+    if np.abs(found).max(initial=0.0) > LARGEST:
+        raise InputError(f"The {what} have coordinates beyond {LARGEST:.0e}; scale the mesh to below that.")
     return found

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .array_files import open_archive, read_array, replacing
+from .array_files import open_archive, read_array, replacing, require_file
 from .errors import InputError
 from .mapping import Mapping, checked_mesh
 from .tetmesh import TetMesh
@@ -95,6 +95,7 @@ def read_tets(path: Path) -> TetFile:
         # Where there are as many vertices as tetrahedra, an array may be either.
         at_tets = {name: values for name, values in arrays.items() if rows[name] == len(tets)}
         return TetFile(points, tets, at_vertices, at_tets)
+    require_file(path)
     with _meshio_errors(path, "read"):
         found = _meshio().read(path, _format(path))
     blocks = [number for number, block in enumerate(found.cells) if block.type == "tetra"]
@@ -174,4 +175,6 @@ def _meshio_errors(path: Path, done: str) -> Iterator[None]:
             yield
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split()) if not isinstance(error, SystemExit) else "not a format meshio knows"
-        raise InputError(f"{path} cannot be {done}: {reason.rstrip('.') or type(error).__name__}.") from error
+        remedy = "export it again, or name another file" if done == "read" else "choose another format or place"
+        reason = reason.rstrip(".") or type(error).__name__
+        raise InputError(f"{path} cannot be {done}: {reason}; {remedy}.") from error

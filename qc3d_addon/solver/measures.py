@@ -50,13 +50,18 @@ def measure(
     for index, found in enumerate(in_threads(lambda moment: vertex_measures.of(*moment), moments)):
         for name, at_vertices in found.items():
             measures.setdefault(name, np.empty(frames.shape[:2], dtype=np.float32))[index] = at_vertices
+    return measures, worst_stretch([part.pair for part in prepared], segments, frames)
+
+
+def worst_stretch(pairs: Sequence[KeyPair], segments: Ints, frames: Floats) -> dict[str, Any]:
+    """The worst stretch beyond the keys among the frames (k, n, 3) of the pairs ``segments`` (k,), as plain values."""
     worst = Excess(0.0, 0, 0)
-    for number, part in enumerate(prepared):
+    for number, pair in enumerate(pairs):
         members = np.flatnonzero(segments == number)
-        beyond = worst_excess(part.pair, frames[members])
-        if beyond.ratio > worst.ratio:
-            worst = beyond._replace(frame=int(members[beyond.frame]))
-    return measures, {"excess": worst.ratio, "frame": worst.frame, "vertex": worst.vertex}
+        found = worst_excess(pair, frames[members])
+        if found.ratio > worst.ratio:
+            worst = found._replace(frame=int(members[found.frame]))
+    return {"excess": worst.ratio, "frame": worst.frame, "vertex": worst.vertex}
 
 
 class VertexMeasures:

@@ -28,6 +28,7 @@ from .location import interpolation_matrix
 from .measures import measure
 from .meshing import fill_cube
 from .natural import NaturalFrames
+from .orientation import require_reachable
 from .prepared import PreparedMap
 from .report import bake_report
 from .settings import Settings
@@ -40,8 +41,11 @@ T = TypeVar("T")
 _LARGE_RESIDUAL = 0.03
 
 
+STAGES = ("mesh", "locate", "fit", "factor", "frames")
+
+
 class Progress(NamedTuple):
-    """Where the work is: the stage's name and how much of that stage is done, 0..1."""
+    """Where the work is: the stage's name, one of ``STAGES``, and how much of that stage is done, 0..1."""
 
     stage: str
     fraction: float
@@ -102,14 +106,17 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
 
     Raises
     ------
+    InputError
+        If the second key is the first one mirrored or turned inside out, which no map without folds reaches.
     MeshingError
         If the engine asked for cannot fill the cube.
 
     Notes
     -----
-    A key that no map without folds can reach, such as a mirrored one, is no error: the map stays as near as it can, a
-    note says so, and the surface meets both keys all the same.
+    Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
+    both keys all the same.
     """
+    require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
     yield Progress("mesh", 0.0)
@@ -142,12 +149,12 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     if path.inside_out:
         note = (
             f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
-            "does that, and a straight blend may look no worse."
+            "does that, and the mode straight may look no worse."
         )
     elif missed > _LARGE_RESIDUAL:
         note = (
             f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
-            "cannot be reached without folds, and its in-betweens are no better than a straight blend."
+            "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
         )
     else:
         return prepared
@@ -190,21 +197,14 @@ def chain_inbetweens(
     InputError
         If a time is outside 0..1 or the pairs are not consecutive.
     """
-    try:
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    except (TypeError, ValueError) as reason:
-        raise InputError("The times of the frames must be numbers.") from reason
-    if wanted.ndim != 1 or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
-        raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (last key).")
-    for left, right in pairwise(prepared):
-        if not np.array_equal(left.pair.key1, right.pair.key0):
-            raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
+    wanted = checked_times(times)
+    require_chain([part.pair for part in prepared])
     seconds = _summed(part.seconds for part in prepared)
     obstacle = None
     if collider is not None:
         with _timed(seconds, "colliders"):
             obstacle = yield from _followed(collider, wanted, settings)
-    segments, local = _split(eased(wanted, settings.easing), len(prepared))
+    segments, local = split(eased(wanted, settings.easing), len(prepared))
     yield Progress("factor", 0.0)
     with _timed(seconds, "factor"):
         makers = yield from _staged("factor", _makers(prepared, settings))
@@ -233,6 +233,24 @@ def chain_inbetweens(
         report |= obstacle.report(frames, prepared[0].pair.faces, report["notes"])
     report |= {"worst_stretch": worst, "key_error": key_error, "seconds": seconds}
     return Bake(wanted, frames, report, measures)
+
+
+def checked_times(times: ArrayLike) -> Floats:
+    """(k,) times of frames; raises InputError where they are no numbers from 0 to 1."""
+    try:
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    except (TypeError, ValueError) as reason:
+        raise InputError("The times of the frames must be numbers.") from reason
+    if wanted.ndim != 1 or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
+        raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (last key).")
+    return wanted
+
+
+def require_chain(pairs: Sequence[KeyPair]) -> None:
+    """Raise InputError unless every pair begins with the key that ended the one before."""
+    for left, right in pairwise(pairs):
+        if not np.array_equal(left.key1, right.key0):
+            raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
 
 
 class _FrameMaker(Protocol):
@@ -266,7 +284,7 @@ def _makers(prepared: Sequence[PreparedMap], settings: Settings) -> Generator[fl
     return join(makers) if len(makers) > 1 else makers
 
 
-def _split(times: Floats, count: int) -> tuple[Ints, Floats]:
+def split(times: Floats, count: int) -> tuple[Ints, Floats]:
     """Number of the pair and time within it, 0..1, for times along a chain of ``count`` pairs."""
     along = times * count
     # Times like 1/3 are not exact: what is meant to be a key is one.

@@ -21,12 +21,7 @@ def bake_report(
 ) -> dict[str, Any]:
     """Engine, settings, sizes, folds, crossings and residuals of the frames at ``times`` (k,)."""
     crossings = [frame.crossings for frame in frames]
-    sentences = list(notes)
-    if any(crossings):
-        worst = int(np.argmax(crossings))
-        sentences.append(
-            f"The frame at {times[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than a key."
-        )
+    sentences = [*notes, *crossing_notes(crossings, times)]
     residuals = [part.landmark_residual() for part in prepared]
     return {
         "engine": ", ".join(dict.fromkeys(part.engine for part in prepared)),
@@ -46,3 +41,11 @@ def bake_report(
         "peak_memory_mb": peak_memory_mb(),
         "notes": list(dict.fromkeys(sentences)),
     }
+
+
+def crossing_notes(crossings: Sequence[int], times: Floats) -> list[str]:
+    """A sentence about the frame at ``times`` (k,) that crosses itself most beyond its keys, if one does."""
+    if not any(crossings):
+        return []
+    worst = int(np.argmax(crossings))
+    return [f"The frame at {times[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than a key."]

@@ -11,7 +11,7 @@ from .easing import Easing
 from .errors import InputError
 from .stretch import StretchLaw
 
-Mode = Literal["natural", "linear"]
+Mode = Literal["natural", "linear", "straight"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["draft", "normal", "fine"]
 
@@ -27,7 +27,8 @@ class Settings:
     Parameters
     ----------
     mode
-        How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme.
+        How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme,
+        ``straight`` moves every vertex along a straight line, without a map.
     stretch
         How ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
     easing

@@ -7,14 +7,12 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
 import zipfile
 import zlib
-from typing import Any
 
 import numpy as np
-from numpy.lib import format as npy_format
 
+from .array_files import require_sizes
 from .errors import InputError
 from .keypair import KeyPair
 from .prepared import PreparedMap
@@ -23,7 +21,6 @@ from .tetmesh import TetMesh
 
 FORMAT_VERSION = 1
 _SEAL_LENGTH = 32
-_MOST_BYTES = 2**31
 _DAMAGED = "The stored map is damaged; prepare the keys again."
 
 
@@ -74,7 +71,8 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
     if data[:_SEAL_LENGTH] != _seal(data[_SEAL_LENGTH:]):
         raise InputError(_DAMAGED)
     try:
-        _require_sizes(data[_SEAL_LENGTH:])
+        with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
+            require_sizes(archive)
         with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
             header = json.loads(bytes(stored["header"]))
             version, owner = header["version"], header["fingerprint"]
@@ -102,18 +100,3 @@ def from_bytes(data: bytes, pair: KeyPair) -> PreparedMap:
     if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
     return PreparedMap(pair, mesh, maps, turns, extra_turns, engine, quality, notes)
-
-
-def _require_sizes(archive: bytes) -> None:
-    """Raise ValueError unless every array is as large as its entry says, and all of them a size that can be held."""
-    npy: Any = npy_format  # without types in some versions
-    with zipfile.ZipFile(io.BytesIO(archive)) as entries:
-        infos = entries.infolist()
-        if sum(info.file_size for info in infos) > _MOST_BYTES:
-            raise ValueError("too large")
-        for info in infos:
-            with entries.open(info) as file:
-                read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-                shape, _, dtype = read_header[npy.read_magic(file)](file)
-                if file.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
-                    raise ValueError("an array is not as large as it says")

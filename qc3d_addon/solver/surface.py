@@ -18,8 +18,10 @@ from .rotations import rotation_vectors
 from .stretch import Stretch
 from .tetmesh import Floats, Ints
 
-# Triangles thinner than this part of the largest area have no usable directions in floating point.
+# Triangles thinner than this part of the largest area have no usable directions in floating point; nor have those
+# whose area may come from rounding: this part of their longest edge times the largest coordinate.
 _THINNEST = 1e-10
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class TriangleDeformation:
     def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
         """Deformation from ``key0`` (n, 3) to ``key1`` of the triangles of ``faces`` that have an area in both."""
         double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
-        usable = np.logical_and(*(double > _THINNEST * double.max(initial=0.0) for double in (double0, double1)))
+        usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
         faces = faces[usable]
         bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
         gradients = hat_gradients(key0, faces, bases0)
@@ -74,6 +76,14 @@ class TriangleDeformation:
         weights *= areas.sum() / max(float(weights.sum()), 1e-300)
         turns = rotation_vectors(rotations)
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
+
+
+def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
+    """(m,) what twice the area of a triangle must exceed: beside the largest, and beside rounding of its corners."""
+    corners = key[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
+    return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
 
 
 def gradient_operator(faces: Ints, gradients: Floats, count: int) -> csr_array:

@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike
 from .colliders import Collider
 from .errors import naming_pair
 from .keypair import KeyPair
-from .pipeline import Bake, Steps, chain_inbetweens, prepare
+from .memory import estimated_mb, require_memory
+from .pipeline import Bake, Steps, chain_inbetweens, checked_times, prepare
 from .settings import Settings
 from .storage import from_bytes, to_bytes
+from .straight import straight_inbetweens
 from .tetmesh import Floats
 
 Ends = tuple[str, str]
@@ -74,9 +76,21 @@ class Task:
         return cls(pairs, tuple(through), settings, wanted, kept or {})
 
     @property
+    def needs_maps(self) -> bool:
+        """Whether maps of the volume are wanted: for frames of all modes but ``straight``, or for themselves."""
+        return self.settings.mode != "straight" or not len(self.times)
+
+    @property
     def new_maps(self) -> int:
         """How many maps have to be made."""
-        return len(self.pairs) - len(self.kept)
+        return len(self.pairs) - len(self.kept) if self.needs_maps else 0
+
+    def require_memory(self, limit_mb: float) -> None:
+        """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
+        vertices = len(next(iter(self.pairs.values())).key0)
+        needed = estimated_mb(vertices, len(self.pairs), len(self.times), self.settings.quality, self.needs_maps)
+        if limit_mb:
+            require_memory(needed, limit_mb, vertices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +100,7 @@ class Outcome:
     Parameters
     ----------
     maps : dict
-        The stored map of every pair by the names of its keys.
+        The stored map of every pair by the names of its keys; none where the task needs no maps.
     bake : Bake or None
         The frames; None where none were wanted.
     """
@@ -103,6 +117,10 @@ def carry_out(task: Task) -> Steps[Outcome]:
     QC3DError
         If a kept map is damaged or belongs to other keys, a map cannot be made, or a time is outside 0..1.
     """
+    checked_times(task.times)  # before the slow part
+    if not task.needs_maps:
+        along = [task.pairs[ends] for ends in pairwise(task.through)]
+        return Outcome({}, (yield from straight_inbetweens(along, task.times, task.settings)))
     prepared, maps = {}, {}
     names = list(dict.fromkeys(task.through))
     for ends, pair in task.pairs.items():

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from .errors import MeshingError
+from .private_folders import PrivateFolder
 from .sampling import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .tet_quality import triangulate
 from .tetmesh import Floats, Ints, TetMesh
@@ -111,8 +111,7 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
     reason = unavailable_reason()
     if reason is not None:
         raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}.")
-    with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
-        folder = Path(name)
+    with PrivateFolder() as folder:
         for key, array in arrays.items():
             np.save(folder / f"{key}.npy", array, allow_pickle=False)
         command = [*load_command(), str(folder), str(time_limit)]
@@ -141,7 +140,12 @@ def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | Non
         flags = subprocess.CREATE_NO_WINDOW
     with open(errors, "wb") as stream:
         process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stream, creationflags=flags
+            command,
+            cwd=errors.parent,  # fTetWild writes files of its own where it runs
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=stream,
+            creationflags=flags,
         )
         try:
             status = process.wait(time_limit)

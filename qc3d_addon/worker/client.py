@@ -11,20 +11,20 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ..solver import errors
 from ..solver.errors import InputError, QC3DError, WorkerError
 from ..solver.interpreter import interpreter
-from ..solver.pipeline import Progress
+from ..solver.pipeline import STAGES, Progress
+from ..solver.private_folders import PrivateFolder
 from ..solver.task import Outcome, Task
 from .exchange import read_outcome, write_task
+from .idleness import LONGEST_IDLE, Idleness
 
 CHILD = Path(__file__).with_name("task_child.py")
 _LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may hold a scipy that is not the bundled one
@@ -53,6 +53,8 @@ class Worker:
 
     Raises
     ------
+    InputError
+        If the task needs more memory than its limit.
     WorkerError
         If the child cannot be started.
     """
@@ -60,19 +62,26 @@ class Worker:
     def __init__(self, task: Task, limits: Limits | None = None) -> None:
         self._task = task
         self._limits = limits or Limits()
+        task.require_memory(self._limits.memory_mb)
         self._progress: Progress | None = None
-        self._ending: dict[str, Any] | None = None
-        self._folder = tempfile.TemporaryDirectory(prefix="qc3d-", ignore_cleanup_errors=True)
+        self._ending: list[str] | None = None  # empty where the work was done, else the kind of error and its sentence
+        self._is_garbled = False
+        self._is_closed = False
         try:
-            write_task(Path(self._folder.name), task)
-            self._errors = Path(self._folder.name) / "errors.txt"
+            self._folder = PrivateFolder()
+        except OSError as error:
+            raise WorkerError(_NOT_STARTED.format(error)) from error
+        self._errors = self._folder.path / "errors.txt"
+        try:
+            write_task(self._folder.path, task)
             self._process = self._start()
         except OSError as error:
-            self._folder.cleanup()
-            raise WorkerError(f"The work cannot be started in a process of its own: {error}.") from error
-        except WorkerError:
-            self._folder.cleanup()
+            self._folder.close()
+            raise WorkerError(_NOT_STARTED.format(error)) from error
+        except BaseException:
+            self._folder.close()
             raise
+        self._idleness = Idleness(self._process.pid)
         self._deadline = clock.monotonic() + self._limits.seconds
         self._reader = threading.Thread(target=self._read_messages, daemon=True)
         self._reader.start()
@@ -91,6 +100,12 @@ class Worker:
             The error that ended the work, a WorkerError where the process ended by itself or by its limits.
         """
         if self._process.poll() is None:
+            if self._is_garbled:
+                self.close()
+                raise WorkerError(_GARBLED)
+            if self._idleness.lasts_too_long:
+                self.close()
+                raise WorkerError(_HANGS.format(LONGEST_IDLE))
             if clock.monotonic() > self._deadline:
                 self.close()
                 raise WorkerError(
@@ -98,6 +113,7 @@ class Worker:
                     "add-on's preferences, or choose a lower quality."
                 )
             return None
+        _kill(self._process)  # what the child started may outlive it, and hold on to its end of the pipe
         self._reader.join()
         try:
             return self._result()
@@ -106,6 +122,9 @@ class Worker:
 
     def close(self) -> None:
         """Stop the child if it still works, and remove its files; nothing happens the second time."""
+        if self._is_closed:
+            return
+        self._is_closed = True
         _kill(self._process)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -113,7 +132,7 @@ class Worker:
             self._process.stdin.close()
         self._reader.join()
         self._process.stdout.close()
-        self._folder.cleanup()
+        self._folder.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
         python = interpreter()
@@ -122,7 +141,7 @@ class Worker:
         package = Path(__file__).resolve().parent.parent
         memory = self._limits.memory_mb * 2**20
         # Without the interpreter's own packages: the child is to use the libraries that this process would.
-        command = [python, "-I", "-S", CHILD, package, self._folder.name, memory, *_library_folders()]
+        command = [python, "-I", "-S", CHILD, package, self._folder.path, memory, *_library_folders()]
         flags = 0
         if sys.platform == "win32":
             flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
@@ -143,42 +162,75 @@ class Worker:
         assert stream is not None
         rest = b""
         while chunk := os.read(stream.fileno(), 65536):
+            if self._is_garbled:
+                continue  # read on: a child that cannot write would not end
             *whole, rest = (rest + chunk).split(b"\0")
             for text in whole:
                 self._take(text)
-            if len(rest) > _LONGEST_MESSAGE:
-                return
+            self._is_garbled |= len(rest) > _LONGEST_MESSAGE
 
     def _take(self, text: bytes) -> None:
         try:
-            message = json.loads(text)
-            if "progress" in message:
-                stage, fraction = message["progress"]
-                self._progress = Progress(str(stage), float(fraction))
-            else:
-                self._ending = dict(message)
-        except (ValueError, TypeError):
-            return  # not a message of ours; how the process ended tells the rest
+            message = _message(text)
+        except (ValueError, TypeError, RecursionError):
+            self._is_garbled = True
+            return
+        if isinstance(message, Progress):
+            self._progress = message
+        else:
+            self._ending = message
 
     def _result(self) -> Outcome:
         ending, status = self._ending, self._process.returncode
-        if ending is not None and "error" in ending:
-            kind, sentence = ending["error"]
-            if kind == "MemoryError":
-                raise WorkerError(_OUT_OF_MEMORY)
-            known = getattr(errors, str(kind), None)
+        if self._is_garbled:
+            raise WorkerError(_GARBLED)
+        if ending:
+            kind, sentence = ending
+            if kind == MemoryError.__name__:
+                raise WorkerError(_out_of_memory(self._limits))
+            known = getattr(errors, kind, None)
             if isinstance(known, type) and issubclass(known, QC3DError):
-                raise known(str(sentence))
-            raise WorkerError(str(sentence))
+                raise known(sentence)
+            raise WorkerError(sentence)
         if ending is None or status != 0:
             raise WorkerError(_how_it_ended(status, self._errors))
         try:
-            return read_outcome(Path(self._folder.name), self._task)
+            return read_outcome(self._folder.path, self._task)
         except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
             raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
 
 
-_OUT_OF_MEMORY = "There is not enough memory; use fewer in-betweens, a lower quality or a smaller mesh."
+_NOT_STARTED = "The work cannot be started in a process of its own: {}; make room in the folder for temporary files."
+_HANGS = (
+    "The process that does the work has done nothing for {:g} s and was stopped; nothing was changed. Memory may have "
+    "run out: try again with a lower quality or fewer in-betweens."
+)
+_GARBLED = (
+    "The process that does the work sent something that is no message of it and was stopped; nothing was changed. Try "
+    "again, and report it if it happens again."
+)
+
+
+def _out_of_memory(limits: Limits) -> str:
+    limit = f" within its limit of {limits.memory_mb} MB" if limits.memory_mb else ""
+    more = ", or allow it more in the add-on's preferences" if limits.memory_mb else ""
+    return f"There is not enough memory{limit}; use fewer in-betweens, a lower quality or a smaller mesh{more}."
+
+
+def _message(text: bytes) -> Progress | list[str]:
+    """A message of the child: how far it is, or how it ended; raises ValueError or TypeError where it is neither."""
+    message = json.loads(text)
+    if message == {"done": True}:
+        return []
+    if set(message) == {"progress"}:
+        stage, fraction = message["progress"]
+        if stage in STAGES and 0.0 <= fraction <= 1.0:
+            return Progress(stage, float(fraction))
+    elif set(message) == {"error"}:
+        kind, sentence = message["error"]
+        if isinstance(kind, str) and isinstance(sentence, str):
+            return [kind, sentence]
+    raise ValueError("not a message")
 
 
 def run(task: Task, on_progress: Callable[[Progress], None] | None = None, limits: Limits | None = None) -> Outcome:
@@ -217,15 +269,14 @@ def _library_folders() -> list[Path]:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End the child and whatever it started."""
-    if process.poll() is None:
-        if sys.platform == "win32":
-            subprocess.run(["taskkill", "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
-            process.kill()
-        else:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    """End the child and whatever it started, which may still be there when the child is not."""
+    if sys.platform != "win32":
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    elif process.poll() is None:
+        subprocess.run(["taskkill", "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
+        process.kill()
+    process.wait()
 
 
 def _how_it_ended(status: int, errors_file: Path) -> str:

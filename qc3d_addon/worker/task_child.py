@@ -18,12 +18,16 @@ import importlib
 import importlib.util
 import json
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
+# What threads, SuperLU and Qhull say where they get none.
+_WORDS_OF_TOO_LITTLE_MEMORY = ("start new thread", "malloc", "memory")
 _NICE = 5  # the window that the user works in comes first
 
 
@@ -32,7 +36,8 @@ def main(arguments: list[str]) -> None:
     # Native code may write to standard output; its text must not end up among the messages.
     messages = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    tempfile.tempdir = str(folder)  # for what fTetWild needs: gone with the folder, whatever happens
+    threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
@@ -54,6 +59,10 @@ def main(arguments: list[str]) -> None:
     except errors.QC3DError as error:
         _send(messages, {"error": [type(error).__name__, str(error)]})
     except MemoryError:
+        _send(messages, {"error": ["MemoryError", ""]})
+    except RuntimeError as error:
+        if not any(word in str(error).lower() for word in _WORDS_OF_TOO_LITTLE_MEMORY):
+            raise
         _send(messages, {"error": ["MemoryError", ""]})
     else:
         _send(messages, {"done": True})
@@ -78,11 +87,12 @@ def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
     messages.flush()
 
 
-def _end_with_parent() -> None:
-    """Wait until standard input closes, then end this process and what it started."""
+def _end_with_parent(folder: Path) -> None:
+    """Wait until standard input closes, then remove the folder and end this process and what it started."""
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
+    shutil.rmtree(folder, ignore_errors=True)
     if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
         os.killpg(os.getpid(), signal.SIGKILL)
     os._exit(1)
@@ -95,9 +105,11 @@ def _limit_memory(limit: int) -> None:
     import resource
 
     import numpy as np
+    from scipy.linalg import blas
 
-    square = np.ones((64, 64))
-    square @ square  # OpenBLAS takes its buffers at the first product, and hangs where it cannot
+    # Both copies of OpenBLAS take their buffers at the first product, and end the process where they get none.
+    square = np.ones((256, 256))
+    blas.dgemm(1.0, square, square @ np.linalg.inv(square + 256.0 * np.eye(256)))
     held = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData:"))
     resource.setrlimit(resource.RLIMIT_DATA, (int(held.split()[1]) * 1024 + limit,) * 2)
 

@@ -34,6 +34,17 @@ def bend(points: Floats) -> Floats:
 
 
 class TestMapping:
+    @pytest.mark.parametrize(("size", "said"), [(1.2e-309, "flat"), (1e-200, "flat"), (1e200, "beyond 1e\\+75")])
+    def test_sizes_that_numbers_cannot_hold(self, size: float, said: str) -> None:
+        points = [[0.0, 0.0, 0.0], [size, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        with np.errstate(all="raise", under="ignore"), pytest.raises(InputError, match=said):
+            checked_mesh(points, [[0, 1, 2, 3]])
+
+    @pytest.mark.parametrize("points", [np.zeros((4, 3), dtype=complex), [["a", "b", "c"]] * 4, np.zeros((4, 3), bool)])
+    def test_what_is_no_coordinate(self, points: object) -> None:
+        with pytest.raises(InputError, match="must be numbers"):
+            checked_mesh(points, [[0, 1, 2, 3]])  # type: ignore[arg-type]
+
     def test_tetrahedra_are_turned_the_right_way_round(self) -> None:
         mesh = kuhn_grid(2)
         tets = mesh.tets.copy()

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -30,7 +31,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr(tetwild_loading, "CHILD", script)
     monkeypatch.setattr(tetwild_loading, "_wrapper", lambda: tmp_path / "wrapper")
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tetwild.tempfile, "tempdir", str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     return script
 
 

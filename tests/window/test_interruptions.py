@@ -118,5 +118,41 @@ def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
     status = own_window.blender.wait()
     assert status == (0 if how == "quits" else -signal.SIGKILL), own_window.log
     own_window.wait_gone(child)
-    if how == "quits":
-        assert list(own_window.folder.glob("qc3d-*")) == []
+    assert list(own_window.folder.glob("qc3d-*")) == []
+
+
+@pytest.mark.parametrize(
+    ("ending", "sentence"),
+    [
+        (signal.SIGKILL, "The process that does the work was ended by SIGKILL; memory may have run out"),
+        (signal.SIGSEGV, "The process that does the work was ended by SIGSEGV"),
+        (signal.SIGSTOP, "The work was stopped after its time limit"),
+    ],
+)
+def test_a_child_that_dies_or_hangs_is_said_and_changes_nothing(window: Window, ending: int, sentence: str) -> None:
+    before = window.ask("state()")
+    child = start(window, "fine")
+    os.kill(child, ending)
+    if ending == signal.SIGSTOP:
+        window.ask("import sys; sys.modules[ADDON + '.blender.jobs'].current()._worker._deadline = 0.0")
+    window.wait_for("job() is None")
+    window.wait_for(f"{sentence!r} in reports()")
+    assert window.ask("state()") == before
+    assert not is_alive(child)
+    assert list(window.folder.glob("qc3d-*")) == []
+    window.press("Escape")  # Blender shows errors in a pop-up, which covers the panel
+    start(window)  # the next one works
+    window.wait_for("job() is None")
+    assert len(window.ask("names()")) == 8
+
+
+def test_a_bake_beyond_the_memory_limit_does_not_start(window: Window) -> None:
+    before = window.ask("state()")
+    window.ask("bpy.context.preferences.addons[ADDON].preferences.memory_limit = 50")
+    try:
+        window.push(BAKE)
+        window.wait_for("'MB of memory, and its limit is 50 MB.' in reports()")
+    finally:
+        window.ask("bpy.context.preferences.addons[ADDON].preferences.memory_limit = 0")
+    assert window.ask("job()") is None
+    assert window.ask("state()") == before

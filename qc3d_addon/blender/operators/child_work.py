@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import bpy
 
 from ...solver.errors import QC3DError
-from .. import jobs, preferences, progress
+from .. import compat, jobs, preferences, progress
 from ..plans import Plan
 
 if TYPE_CHECKING:
@@ -54,10 +54,14 @@ class ChildWork:
 
             manager.progress_begin(0.0, 1.0)
             try:
-                outcome = client.run(plan.task, show, preferences.limits(context))
+                with compat.interruptible():
+                    outcome = client.run(plan.task, show, preferences.limits(context))
             finally:
                 manager.progress_end()
             return self._finish(plan, outcome)
+        except KeyboardInterrupt:
+            self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
+            return {'CANCELLED'}
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}

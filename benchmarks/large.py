@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Memory and time of bakes of large meshes: python -m benchmarks.large [VERTICES ...] (Linux).
+
+The bodies of the data folder, each triangle divided into smaller ones until there are about so many vertices. The bake
+runs as Blender runs it, in a child process; memory is the largest sum, over this process's children and theirs, of
+what each has for itself and its share of the rest.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time as clock
+from pathlib import Path
+
+import numpy as np
+
+from qc3d_addon.solver.array_files import read_pairs
+from qc3d_addon.solver.keypair import KeyPair
+from qc3d_addon.solver.pipeline import Progress, evenly_spaced
+from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.task import Task
+from qc3d_addon.solver.topology import sides
+from qc3d_addon.worker import client
+
+from .catalogue import DATA
+
+SIZES = (6_890, 27_554, 110_210, 440_834)
+KEYS = ("rest", "arms_overhead")
+FRAMES = 5
+_PAUSE = 0.05
+
+
+def main(arguments: list[str]) -> None:
+    """Print the table."""
+    settings = Settings(engine=os.environ.get("QC3D_ENGINE", "auto"))  # type: ignore[arg-type]
+    print("| vertices | engine | s | MB | seconds by stage |")
+    print("|---|---|---|---|---|")
+    for wanted in map(int, arguments or map(str, SIZES)):
+        pair = divided(read_pairs(DATA / "body.npz", KEYS)[0], wanted)
+        task = Task({KEYS: pair}, KEYS, settings, evenly_spaced(FRAMES))
+        started = clock.perf_counter()
+        with PeakMemory() as peak:
+            bake = client.run(task, peak.note).bake
+        assert bake is not None
+        stages = ", ".join(f"{name} {seconds:.0f}" for name, seconds in bake.report["seconds"].items())
+        taken = clock.perf_counter() - started
+        print(f"| {len(pair.key0)} | {bake.report['engine']} | {taken:.0f} | {peak.megabytes:.0f} | {stages} |")
+        print(f"  by stage: {peak.stages}", file=sys.stderr, flush=True)
+
+
+def divided(pair: KeyPair, vertices: int) -> KeyPair:
+    """The pair with every triangle divided into four, again and again, until it has so many vertices or more."""
+    key0, key1, faces = pair.key0, pair.key1, pair.faces
+    while len(key0) < vertices:
+        edges, place = np.unique(np.sort(sides(faces), axis=1), axis=0, return_inverse=True)
+        middle = len(key0) + place.reshape(3, -1)
+        key0, key1 = (np.concatenate([key, key[edges].mean(axis=1)]) for key in (key0, key1))
+        (first, second, third), (a, b, c) = middle, faces.T
+        parts = ((a, first, third), (first, b, second), (third, second, c), (first, second, third))
+        faces = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return KeyPair.checked(key0, key1, faces)
+
+
+class PeakMemory:
+    """Watches this process's children while the block runs."""
+
+    def __init__(self) -> None:
+        self.megabytes = 0.0
+        self.stages: dict[str, int] = {}
+        self._stage = "start"
+        self._over = threading.Event()
+        self._watch = threading.Thread(target=self._look)
+
+    def __enter__(self) -> PeakMemory:
+        self._watch.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._watch.join()
+
+    def note(self, progress: Progress) -> None:
+        """Note which stage the work is in."""
+        self._stage = progress.stage
+
+    def _look(self) -> None:
+        while not self._over.wait(_PAUSE):
+            held = sum(map(_megabytes, _descendants(os.getpid())))
+            self.megabytes = max(self.megabytes, held)
+            self.stages[self._stage] = max(self.stages.get(self._stage, 0), round(held))
+
+
+def _descendants(process: int) -> list[int]:
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+        except (OSError, ValueError):
+            continue
+        found.append((parent, int(folder.name)))
+    below, level = [], [process]
+    while level:
+        level = [child for parent, child in found if parent in level]
+        below += level
+    return below
+
+
+def _megabytes(process: int) -> float:
+    try:
+        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

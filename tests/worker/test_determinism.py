@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The same mesh, keys, settings and kept map give the same frames bit for bit, in whatever process."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from qc3d_addon.solver.meshing import engine_available, fill_cube
+from qc3d_addon.solver.pipeline import Bake, evenly_spaced, finish
+from qc3d_addon.solver.settings import Engine, Mode, Settings
+from qc3d_addon.solver.storage import from_bytes
+from qc3d_addon.solver.task import Outcome, Task, carry_out
+from qc3d_addon.worker import client
+
+from ..fuzz.mesh_cases import coarser
+from ..solver.meshes import arced, box_surface, icosphere
+
+KEYS = ("Basis", "Bent")
+
+
+def task_with(
+    engine: Engine, mode: Mode = "natural", seed: int = 3, kept: dict[tuple[str, str], bytes] | None = None
+) -> Task:
+    points, faces = box_surface((2, 2, 8), (1.0, 1.0, 5.0))
+    settings = Settings(engine=engine, quality="draft", mode=mode, seed=seed)
+    shapes = {"Basis": points, "Bent": arced(points, 0.9)}
+    no_edges = np.empty((0, 2), dtype=np.int64)
+    return Task.of_keys(shapes, faces, no_edges, KEYS, settings, evenly_spaced(2), kept)
+
+
+def frames_of(outcome: Outcome) -> bytes:
+    assert isinstance(outcome.bake, Bake)
+    measures = sorted(outcome.bake.measures.items())
+    return outcome.bake.frames.tobytes() + b"".join(values.tobytes() for _, values in measures)
+
+
+def digest_of_a_bake(engine: Engine, mode: Mode) -> str:
+    coarser()
+    return hashlib.sha256(frames_of(finish(carry_out(task_with(engine, mode))))).hexdigest()
+
+
+@pytest.mark.parametrize("mode", ["natural", "linear", "straight"])
+def test_other_processes_with_other_hashes_give_the_same(mode: Mode, repository: Path) -> None:
+    program = f"from tests.worker.test_determinism import digest_of_a_bake as d; print(d('delaunay', {mode!r}))"
+    found = set()
+    for hashes in ("0", "1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": hashes}
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=repository, env=environment, capture_output=True, text=True, check=True
+        )
+        found.add(done.stdout.strip())
+    assert len(found) == 1
+
+
+def test_another_seed_gives_another_mesh_and_other_frames() -> None:
+    one, other = (finish(carry_out(task_with("delaunay", seed=seed))) for seed in (3, 4))
+    assert frames_of(one) != frames_of(other)
+
+
+def test_the_seeded_mesh_is_the_same_bit_for_bit() -> None:
+    meshes = [fill_cube(*icosphere(2), Settings(engine="delaunay", quality="draft", seed=5)).mesh for _ in range(2)]
+    np.testing.assert_array_equal(meshes[0].points, meshes[1].points)
+    np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
+
+
+@pytest.mark.parametrize("engine", ["delaunay", "tetwild"])
+def test_a_kept_map_gives_the_same_frames_again(engine: Engine) -> None:
+    """fTetWild makes another mesh at every call; the one that is kept with the bake is used again."""
+    if not engine_available(engine):
+        pytest.skip(f"the engine {engine} cannot run here")
+    first = client.run(task_with(engine))
+    again = task_with(engine, kept=first.maps)
+    assert again.new_maps == 0
+    outcomes = [first, client.run(again), finish(carry_out(again))]
+    assert len({frames_of(outcome) for outcome in outcomes}) == 1
+    assert all(outcome.maps == first.maps for outcome in outcomes)
+
+
+def test_a_kept_map_serves_another_number_of_frames() -> None:
+    first = client.run(task_with("delaunay"))
+    denser = replace(task_with("delaunay", kept=first.maps), times=evenly_spaced(5))
+    found = finish(carry_out(denser)).bake
+    assert found is not None
+    assert first.bake is not None
+    np.testing.assert_array_equal(found.frames[::2], first.bake.frames)
+    mesh = from_bytes(first.maps[KEYS], denser.pairs[KEYS]).mesh
+    assert len(mesh.tets) > 100

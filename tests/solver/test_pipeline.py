@@ -87,7 +87,7 @@ class TestPreparedMap:
         assert residual["rms"] < 0.01
 
     def test_seconds_of_every_stage(self, prepared: PreparedMap) -> None:
-        assert set(prepared.seconds) == {"mesh", "locate", "fit"}
+        assert set(prepared.seconds) == {"mesh", "locate", "path", "fit"}
         assert min(prepared.seconds.values()) >= 0.0
 
 
@@ -152,7 +152,7 @@ class TestReport:
         assert report["folds"]["map"] == 0
         assert len(report["folds"]["frames"]) == len(TIMES)
         assert report["residual"] == prepared.landmark_residual()
-        assert set(report["seconds"]) == {"mesh", "locate", "fit", "factor", "frames", "measure"}
+        assert set(report["seconds"]) == {"mesh", "locate", "path", "fit", "factor", "frames", "measure"}
         assert report["peak_memory_mb"] is None or 10.0 < report["peak_memory_mb"] < 1e6
         assert report["notes"] == []
 

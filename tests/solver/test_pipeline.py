@@ -243,7 +243,7 @@ def test_times_that_are_no_numbers_are_refused() -> None:
 
 def test_a_mirrored_key_is_refused_before_the_cube_is_filled() -> None:
     pair = KeyPair.checked(BAR, BAR * [-1.0, 1.0, 1.0], FACES)
-    with pytest.raises(InputError, match="mirrored or turned inside out.*Choose the mode straight"):
+    with pytest.raises(InputError, match=r"mirrored or turned inside out.*Choose the mode straight"):
         next(prepare(pair, DRAFT))
 
 

@@ -3,12 +3,14 @@
 """How fast live scrub is, and how near: python -m benchmarks.scrub [FOLDER OF THE DATA].
 
 For each pair: the error of the preview against frames computed at times it does not know, the seconds until it shows
-(a child process makes the frames from the kept map), its memory, the time to evaluate it, and the time of a whole step
-in Blender, from the slider to the evaluated mesh with its normals, without drawing.
+(a child process makes the frames from the kept map) and those of the processor's time among them, its memory, the time
+to evaluate it, and the time of a whole step in Blender, from the slider to the evaluated mesh with its normals, without
+drawing. The last two are medians, which other work on the same machine changes least.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import time as clock
 from pathlib import Path
@@ -38,32 +40,40 @@ def main(arguments: list[str]) -> None:
     """Print the table."""
     folder = Path(arguments[0]) if arguments else DATA
     settings = Settings(engine="delaunay")
-    columns = ("pair", "vertices", "steps", "largest error / diagonal", "s until it shows", "MB", "ms an evaluation")
-    print(f"| {' | '.join((*columns, 'ms a step'))} |")
-    print("|---|---|---|---|---|---|---|---|")
+    columns = ("pair", "vertices", "steps", "largest error / diagonal", "s until it shows", "processor s", "MB")
+    print(f"| {' | '.join((*columns, 'ms an evaluation', 'ms a step'))} |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for file, first, second in PAIRS:
         pair = read_pairs(folder / f"{file}.npz", (first, second))[0]
         prepared = finish(prepare(pair, settings))
         known = finish(inbetweens(prepared, _BETWEEN, settings)).frames
         ends = (first, second)
         for steps in STEPS:
-            started = clock.perf_counter()
+            started, used = clock.perf_counter(), _processor_seconds()
             task = Task({ends: pair}, ends, settings, evenly_spaced(steps - 1), {ends: to_bytes(prepared)})
             bake = client.run(task, None).bake
             assert bake is not None
             curve = PreviewCurve(bake.frames)
-            waited = clock.perf_counter() - started
+            waited, used = clock.perf_counter() - started, _processor_seconds() - used
             error = max(np.abs(curve.at(time) - frame).max() for time, frame in zip(_BETWEEN, known, strict=True))
-            started = clock.perf_counter()
+            marks = [clock.perf_counter()]
             for number in range(_EVALUATIONS):
                 curve.beyond_blend(number / _EVALUATIONS, BAKED_STEPS)
-            evaluation = (clock.perf_counter() - started) / _EVALUATIONS
+                marks.append(clock.perf_counter())
             print(
                 f"| {file} {first} → {second} | {len(pair.key0)} | {steps} | {error / pair.diagonal:.1e} "
-                f"| {waited:.1f} | {curve.nbytes / 1e6:.1f} | {1e3 * evaluation:.2f} "
+                f"| {waited:.1f} | {used:.1f} | {curve.nbytes / 1e6:.1f} | {1e3 * np.median(np.diff(marks)):.2f} "
                 f"| {1e3 * _step_in_blender(pair, curve):.1f} |",
                 flush=True,
             )
+
+
+def _processor_seconds() -> float:
+    """Seconds that this process and its children that ended had of the processor."""
+    return sum(
+        usage.ru_utime + usage.ru_stime
+        for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    )
 
 
 def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
@@ -84,14 +94,15 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
         key.value = 0.5
     preview = obj.shape_key_add(name="Preview", from_mix=False)
     preview.value = 1.0
-    started = clock.perf_counter()
+    marks = [clock.perf_counter()]
     for number in range(_UPDATES):
         basis = key_coordinates(obj, "Basis")
         set_key_coordinates(preview, basis + curve.beyond_blend(number / _UPDATES, BAKED_STEPS))
         mesh.shape_keys.update_tag()
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         evaluated.corner_normals[0].vector.copy()
-    return (clock.perf_counter() - started) / _UPDATES
+        marks.append(clock.perf_counter())
+    return float(np.median(np.diff(marks)))
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ class Problem:
     def fitted(self) -> Floats:
         """Our fit to the last target by way of the others, as a bake does it."""
         fitter = FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
-        steps = follow_path(fitter, self.targets, len(self.targets))
+        steps = follow_path(fitter, self.targets)
         while True:
             try:
                 next(steps)

@@ -27,7 +27,7 @@ from .report import table, write_between_markers
 from .stage_cases import LIMITS, SIZES
 
 DOCUMENT = ROOT / "docs/speed.md"
-STAGES = ("mesh", "locate", "fit", "factor", "frames", "measure", "write")
+STAGES = ("mesh", "locate", "path", "fit", "factor", "frames", "measure", "write")
 _ROUNDS = 3
 
 

@@ -23,7 +23,7 @@ def test_the_limb_is_closed_and_faces_outwards_in_both_shapes() -> None:
 
 def test_every_stage_is_timed() -> None:
     found = stages.run("limb:300", "delaunay", 2)
-    for stage in ("mesh", "locate", "fit", "factor", "frames", "measure"):
+    for stage in ("mesh", "locate", "path", "fit", "factor", "frames", "measure"):
         assert found[f"stage_{stage}"] > 0.0
     assert found["cold"] >= sum(found[f"stage_{stage}"] for stage in ("mesh", "fit", "frames"))
     assert 0.0 < found["floor_one_of_each"] < found["floor_with_sweeps"] < found["one"]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,36 +42,29 @@ def path_to(path: SurfacePath, key1: Floats) -> Iterator[Floats]:
 
     Their number follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
     """
-    steps = step_count(path)
+    angles = np.degrees(path.turning.angles)
+    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
     for step in range(1, steps):
         # The shapes on the way only lead the map; they need not have settled.
         yield path.positions(step / steps, sweeps=_PATH_SWEEPS)
     yield key1
 
 
-def step_count(path: SurfacePath) -> int:
-    """How many steps lead to the second key."""
-    angles = np.degrees(path.turning.angles)
-    return max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
-
-
-def follow_path(fitter: FoldFreeFitter, targets: Iterable[Floats], steps: int) -> Generator[float, None, FollowedPath]:
+def follow_path(fitter: FoldFreeFitter, targets: Sequence[Floats]) -> Generator[float, None, FollowedPath]:
     """Fit the map to the second key by way of the shapes between.
 
     Parameters
     ----------
     fitter : FoldFreeFitter
-    targets : iterable of (n, 3)
+    targets : sequence of (n, 3)
         Where the landmarks should be after each step, cube units; the second key last.
-    steps : int
-        The number of targets.
 
     Yields
     ------
     float
         The part that is done, 0..1.
     """
-    mesh = fitter.mesh
+    mesh, steps = fitter.mesh, len(targets)
     maps = np.empty((steps + 1, *mesh.points.shape))
     maps[0] = mesh.points
     turns = np.zeros((len(mesh.tets), 3))

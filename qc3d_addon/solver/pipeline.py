@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .chain import join
 from .colliders import Collider, Guard, Obstacle
-from .continuation import follow_path, path_to, step_count
+from .continuation import follow_path, path_to
 from .easing import eased
 from .embedding import Embedding
 from .errors import InputError
@@ -127,11 +127,16 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     with _timed(seconds, "locate"):
         landmarks = interpolation_matrix(filled.mesh, embedding.key0)
     yield Progress("locate", 1.0)
+    yield Progress("fit", 0.0)
+    with _timed(seconds, "path"):
+        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
+        targets = []
+        for target in path_to(path, embedding.key1):
+            targets.append(target)
+            yield Progress("fit", 0.0)
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
-        targets = path_to(path, embedding.key1)
-        followed = yield from _staged("fit", follow_path(fitter, targets, step_count(path)))
+        followed = yield from _staged("fit", follow_path(fitter, targets))
     yield Progress("fit", 1.0)
     prepared = PreparedMap(
         pair,

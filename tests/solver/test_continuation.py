@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from qc3d_addon.solver.continuation import FollowedPath, follow_path, path_to, step_count
+from qc3d_addon.solver.continuation import FollowedPath, follow_path, path_to
 from qc3d_addon.solver.embedding import Embedding
 from qc3d_addon.solver.foldfree import FoldFreeFitter
 from qc3d_addon.solver.keypair import KeyPair
@@ -26,7 +26,7 @@ def followed(key1: Floats) -> tuple[Embedding, FoldFreeFitter, FollowedPath, lis
     mesh = jittered_grid(8, seed=1)
     fitter = FoldFreeFitter(mesh, interpolation_matrix(mesh, embedding.key0), embedding.weights)
     path = SurfacePath(embedding)
-    steps = follow_path(fitter, path_to(path, embedding.key1), step_count(path))
+    steps = follow_path(fitter, list(path_to(path, embedding.key1)))
     done: list[float] = []
     while True:
         try:

@@ -87,7 +87,7 @@ class TestPreparedMap:
         assert residual["rms"] < 0.01
 
     def test_seconds_of_every_stage(self, prepared: PreparedMap) -> None:
-        assert set(prepared.seconds) == {"mesh", "locate", "fit"}
+        assert set(prepared.seconds) == {"mesh", "locate", "path", "fit"}
         assert min(prepared.seconds.values()) >= 0.0
 
 
@@ -152,7 +152,7 @@ class TestReport:
         assert report["folds"]["map"] == 0
         assert len(report["folds"]["frames"]) == len(TIMES)
         assert report["residual"] == prepared.landmark_residual()
-        assert set(report["seconds"]) == {"mesh", "locate", "fit", "factor", "frames", "measure"}
+        assert set(report["seconds"]) == {"mesh", "locate", "path", "fit", "factor", "frames", "measure"}
         assert report["peak_memory_mb"] is None or 10.0 < report["peak_memory_mb"] < 1e6
         assert report["notes"] == []
 
@@ -241,8 +241,16 @@ def test_times_that_are_no_numbers_are_refused() -> None:
         finish(inbetweens(prepared_once("bending and moving"), ["soon"], DRAFT))
 
 
-def test_a_mirrored_key_is_met_and_a_note_says_what_that_is_worth() -> None:
+def test_a_mirrored_key_is_refused_before_the_cube_is_filled() -> None:
     pair = KeyPair.checked(BAR, BAR * [-1.0, 1.0, 1.0], FACES)
+    with pytest.raises(InputError, match=r"mirrored or turned inside out.*Choose the mode straight"):
+        next(prepare(pair, DRAFT))
+
+
+def test_a_mirrored_part_is_met_and_a_note_says_what_that_is_worth() -> None:
+    part = 0.3 * BAR + [3.0, 0.0, 0.0]
+    key0, key1 = np.concatenate([BAR, part]), np.concatenate([BAR, part * [-1.0, 1.0, 1.0] + [6.0, 0.0, 0.0]])
+    pair = KeyPair.checked(key0, key1, np.concatenate([FACES, FACES + len(BAR)]))
     prepared = finish(prepare(pair, DRAFT))
     bake = finish(inbetweens(prepared, [0.0, 0.5, 1.0], DRAFT))
     assert any("mirrored" in note for note in bake.report["notes"])

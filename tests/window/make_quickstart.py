@@ -113,6 +113,7 @@ def play(window: Window, pictures: Path) -> None:
     window.press("space")
     window.wait_for("bpy.context.scene.frame_current >= 12")
     window.press("space")
+    window.wait_for("not bpy.context.window_manager.windows[0].screen.is_animation_playing")
     time.sleep(SETTLE)
     window.shoot(pictures / "quickstart-play.png", VIEW_AND_STATUS)
 

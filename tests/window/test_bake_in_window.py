@@ -11,7 +11,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from .harness import Window, is_alive, redraws
+from .harness import Window, is_alive, paused, redraws
 
 BAKE, CANCEL, REBAKE = "qc3d.bake_inbetweens", "qc3d.cancel", "qc3d.rebake"
 OWN = ["Basis", "Bend 90", "Twist 120", "Bend and twist"]
@@ -47,10 +47,13 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
     # What a computer draws in a second is its own affair; drawing must not wait for the bake.
     assert rates[1] > 0.2 * rates[0]
 
-    window.ask("arm().qc3d.quality = 'fine'")
-    start(window)
-    first = window.wait(lambda: bar_width(window, tmp_path / "first.png"), "a progress bar")
-    window.wait(lambda: bar_width(window, tmp_path / "second.png") > first, "a longer progress bar")
+    child = start(window)
+    widths = []
+    for fraction in (0.2, 0.6):
+        window.wait_for(f"job().course.fraction > {fraction}")
+        with paused(child):
+            widths.append(bar_width(window, tmp_path / f"{fraction}.png"))
+    assert 0 < widths[0] < widths[1]
     window.press("Escape")
     window.wait_for("job() is None")
 
@@ -72,7 +75,8 @@ def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
     before = window.ask("state()")
     child = start(window)
     if button:
-        window.move(*window.find(CANCEL))
+        with paused(child):
+            window.move(*window.find(CANCEL))
     began = time.monotonic()
     if button:
         window.press_mouse()

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from .conftest import open_arm
-from .harness import Window, is_alive
+from .harness import Window, is_alive, paused
 
 BAKE = "qc3d.bake_inbetweens"
 CHANGED = "'Arm' was changed meanwhile; nothing was written."
@@ -45,8 +45,8 @@ def own_window(root: Path, repository: Path) -> Iterator[Window]:
     ids=["sculpted", "key renamed", "edited", "deleted"],
 )
 def test_what_was_changed_meanwhile_is_not_written_to(window: Window, change: str, sentence: str) -> None:
-    start(window)
-    window.ask(f"keys = list(bpy.data.meshes['Arm'].shape_keys.key_blocks)\n{change}\nremember('Changed')")
+    with paused(start(window)):
+        window.ask(f"keys = list(bpy.data.meshes['Arm'].shape_keys.key_blocks)\n{change}\nremember('Changed')")
     window.wait_for("job() is None")
     window.wait_for(f"{sentence!r} in reports()")
     assert window.ask("len(bpy.data.meshes['Arm'].shape_keys.key_blocks)") == 4
@@ -54,8 +54,8 @@ def test_what_was_changed_meanwhile_is_not_written_to(window: Window, change: st
 
 
 def test_a_renamed_object_and_another_active_one_are_no_obstacle(window: Window) -> None:
-    start(window)
-    window.ask("bpy.ops.mesh.primitive_cube_add(); bpy.data.objects['Arm'].name = 'Limb'; remember('Renamed')")
+    with paused(start(window)):
+        window.ask("bpy.ops.mesh.primitive_cube_add(); bpy.data.objects['Arm'].name = 'Limb'; remember('Renamed')")
     window.wait_for("job() is None")
     assert len(window.ask("list(bpy.data.objects['Limb'].data.shape_keys.key_blocks.keys())")) == 8
     assert window.ask("bpy.context.view_layer.objects.active.name") == "Cube"
@@ -63,9 +63,9 @@ def test_a_renamed_object_and_another_active_one_are_no_obstacle(window: Window)
 
 def test_an_undo_meanwhile_has_a_defined_outcome(window: Window) -> None:
     window.ask("arm().location.x = 1.0; remember('Moved')")
-    start(window)
-    window.press("ctrl+z")
-    window.wait_for("arm().location.x == 0.0")
+    with paused(start(window)):
+        window.press("ctrl+z")
+        window.wait_for("arm().location.x == 0.0")
     window.wait_for("job() is None")
     assert len(window.ask("names()")) == 8
 

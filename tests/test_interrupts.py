@@ -34,7 +34,7 @@ else:
     from qc3d_addon import cli, progress_bars
     from qc3d_addon.solver import array_files
     if stage == "read":
-        array_files.np.load = strike
+        array_files.open_archive = strike
     elif stage == "open":
         import bpy
         from qc3d_addon.blender import bake

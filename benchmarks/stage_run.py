@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import resource
 import sys
+import tempfile
 import time as clock
 from collections.abc import Callable
 from contextlib import suppress
@@ -23,7 +25,7 @@ from . import stage_cases
 from .catalogue import Floats, Ints
 
 if TYPE_CHECKING:
-    from qc3d_addon.solver.prepared import PreparedMap
+    from qc3d_addon.solver.natural import NaturalFrames
 
 _REPEATS = 5
 
@@ -42,6 +44,7 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     """Seconds of each stage of a cold bake, of a warm one and of a second one, and the floor of a frame."""
     started = clock.perf_counter()
     from qc3d_addon.solver.keypair import KeyPair
+    from qc3d_addon.solver.natural import NaturalFrames
     from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
     from qc3d_addon.solver.settings import Settings
 
@@ -55,7 +58,8 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     cold = clock.perf_counter() - started
     seconds: dict[str, float] = dict(bake.report["seconds"])
     warm = _fastest(lambda: finish(inbetweens(prepared, evenly_spaced(count), settings)), 2)
-    one = _fastest(lambda: finish(inbetweens(prepared, [0.4], settings)), 3)
+    maker = NaturalFrames(prepared)
+    one = _fastest(lambda: list(maker.frames(np.array([0.4]))), _REPEATS)
     found = {
         "vertices": len(key0),
         "tetrahedra": len(prepared.mesh.tets),
@@ -65,7 +69,7 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
         "warm": warm,
         "one": one,
         **{f"stage_{name}": value for name, value in seconds.items()},
-        **{f"floor_{name}": value for name, value in _floors(prepared).items()},
+        **{f"floor_{name}": value for name, value in _floors(maker).items()},
         "count": count,
     }
     with suppress(ImportError):  # without Blender's module there is nothing to write to
@@ -73,12 +77,10 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     return found
 
 
-def _floors(prepared: PreparedMap) -> dict[str, float]:
+def _floors(maker: NaturalFrames) -> dict[str, float]:
     """Seconds of the back-substitutions of one frame: one of each system, and as many as its sweeps make."""
-    from qc3d_addon.solver.natural import NaturalFrames
     from qc3d_addon.solver.surface_path import SWEEPS
 
-    maker = NaturalFrames(prepared)
     surface, systems = maker._surface._surface, maker._volume._systems
     loads = np.ones((3, len(surface.moving)))
 
@@ -117,9 +119,13 @@ def yardstick(case: str) -> dict[str, Any]:
     tetrahedralize = importlib.import_module("pytetwild").tetrahedralize
 
     faces, key0, _ = stage_cases.load(case)
-    started = clock.perf_counter()
-    _, tets = tetrahedralize(key0, faces.astype(np.int32))
-    return {"yardstick": clock.perf_counter() - started, "tetrahedra": len(tets)}
+    with tempfile.TemporaryDirectory(prefix="qc3d-") as folder:
+        os.chdir(folder)  # fTetWild leaves a file of its own where it runs
+        started = clock.perf_counter()
+        _, tets = tetrahedralize(key0, faces.astype(np.int32))
+        seconds = clock.perf_counter() - started
+        os.chdir("/")
+    return {"yardstick": seconds, "tetrahedra": len(tets)}
 
 
 def _fastest(work: Callable[[], object], repeats: int) -> float:

@@ -40,16 +40,23 @@ def crossing_pairs(points: Floats, faces: Ints, moving: Bools | None = None) -> 
     corners = np.ascontiguousarray(points.T)[:, faces.T]
     low, high = corners.min(axis=1), corners.max(axis=1)
     depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
+    members = np.arange(len(faces))
+    if moving is not None:
+        # What is not in the box of all that moves cannot be crossed by it.
+        lowest, highest = low[:, moving].min(axis=1), high[:, moving].max(axis=1)
+        members = np.flatnonzero(((low <= highest[:, None]) & (high >= lowest[:, None])).all(axis=0))
+        corners, low, high, moving = corners[:, :, members], low[:, members], high[:, members], moving[members]
+    vertices = faces[members]
     triangles = _Triangles.of(corners)
     codes = [np.empty(0, dtype=np.int64)]
     for first, second in _candidates(low.T, high.T, moving):
         for axis in range(3):
             met = (low[axis, first] <= high[axis, second]) & (low[axis, second] <= high[axis, first])
             first, second = first[met], second[met]
-        apart = ~_share_a_vertex(faces[first], faces[second])
+        apart = ~_share_a_vertex(vertices[first], vertices[second])
         first, second = first[apart], second[apart]
         crossing = _cross(triangles, first, second, depth)
-        codes.append(first[crossing] * len(faces) + second[crossing])
+        codes.append(members[first[crossing]] * len(faces) + members[second[crossing]])
     unique = np.unique(np.concatenate(codes))
     return np.stack([unique // len(faces), unique % len(faces)], axis=1)
 

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals a
 
 # Runs the command and sends the signal when the named stage is reached, a second time a moment later if asked to.
 PROGRAM = """
-import os, sys
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background starts with Ctrl-C ignored
 stage, number = sys.argv[1], int(sys.argv[2])
 del sys.argv[1:3]
 

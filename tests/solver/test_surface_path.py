@@ -57,6 +57,16 @@ def path_of(key0: Floats, key1: Floats, faces: Ints, edges: Ints | None = None) 
     return embedding, SurfacePath(embedding)
 
 
+def test_nothing_jumps_in_time() -> None:
+    # A thin limb settles slowly: what an acceleration that adapts to each shape makes of it jumps by most of a step.
+    limb, faces = box_surface((4, 4, 40), (0.2, 1.0, 10.0))
+    path = path_of(limb, arced(limb, 2.4), faces)[1]
+    shapes = np.stack([path.positions(time) for time in np.linspace(0.0, 1.0, 33)])
+    speed = np.linalg.norm(np.diff(shapes, axis=0), axis=2).max()
+    bends = np.linalg.norm(np.diff(shapes, 2, axis=0), axis=2).max(axis=1)
+    assert np.abs(np.diff(bends)).max() < 0.02 * speed
+
+
 @pytest.fixture(scope="module", params=PAIRS)
 def pair(request: pytest.FixtureRequest) -> tuple[Embedding, SurfacePath]:
     return path_of(*PAIRS[request.param])
@@ -82,13 +92,6 @@ class TestEveryPair:
         steps = np.abs(np.diff(shapes, axis=0)).max(axis=(1, 2))
         # No step is much longer than the others: nothing jumps.
         assert steps.max() <= 2.0 * np.median(steps) + 1e-12
-
-    def test_nothing_jumps_in_time(self, pair: tuple[Embedding, SurfacePath]) -> None:
-        shapes = np.stack([pair[1].positions(time) for time in np.linspace(0.0, 1.0, 33)])
-        speeds = np.linalg.norm(np.diff(shapes, axis=0), axis=2).max(axis=1)
-        bends = np.linalg.norm(np.diff(shapes, 2, axis=0), axis=2).max(axis=1)
-        # A vertex that jumps by a fifth of a step would double the bend of its path there and beside it.
-        assert np.abs(np.diff(bends)).max() <= 0.1 * speeds.max() + 1e-9
 
     def test_the_same_time_gives_the_same_shape(self, pair: tuple[Embedding, SurfacePath]) -> None:
         _, path = pair

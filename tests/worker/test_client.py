@@ -275,8 +275,11 @@ class TestTheRealChild:
     @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
     def test_nothing_outlives_the_process_that_waits(self, temporary: Path, repository: Path, ending: int) -> None:
         program = (
+            "import signal\n"
             "from tests.worker.test_client import small_task\n"
             "from qc3d_addon.worker.client import Worker\n"
+            # A job in the background starts with Ctrl-C ignored.
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
             "worker = Worker(small_task('fine'))\n"
             "while worker.progress is None: worker.poll()\n"
             "print(worker._process.pid, flush=True)\n"

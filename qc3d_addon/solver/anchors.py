@@ -9,6 +9,7 @@ import numpy as np
 from .rotations import rotation_matrices
 from .screws import best_turns, translation_factors
 from .tetmesh import Bools, Floats, Ints
+from .topology import sums_by_label
 
 
 class ScrewAnchors:
@@ -35,10 +36,10 @@ class ScrewAnchors:
         source, target = key0[self._members], key1[self._members]
         weight = weights[self._members]
         weight = weight / np.bincount(parts, weights=weight)[parts]
-        centres = [_summed(parts, weight[:, None] * points) for points in (source, target)]
+        centres = [sums_by_label(parts, weight[:, None] * points) for points in (source, target)]
         spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
         products = weight[:, None, None] * spread[1][:, :, None] * spread[0][:, None, :]
-        self._turns = best_turns(_summed(parts, products.reshape(-1, 9)).reshape(-1, 3, 3))
+        self._turns = best_turns(sums_by_label(parts, products.reshape(-1, 9)).reshape(-1, 3, 3))
         rotations = rotation_matrices(self._turns)
         shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
         self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]
@@ -58,8 +59,3 @@ class ScrewAnchors:
     def positions(self, time: float) -> Floats:
         """(n, 3) anchors at ``time``; the keys at 0 and 1."""
         return self._moved(time) + time * self._missing
-
-
-def _summed(parts: Ints, values: Floats) -> Floats:
-    """(parts, c) sums of the rows of ``values`` (n, c) that belong to each part."""
-    return np.stack([np.bincount(parts, weights=column) for column in values.T], axis=1)

@@ -9,8 +9,9 @@ import numpy as np
 from .enclosed import ClosedComponents
 from .errors import InputError
 from .keypair import KeyPair
+from .surface import face_normals
 from .tetmesh import Bools, Floats, Ints
-from .topology import sides, unique_edges, vertex_components, welded
+from .topology import sides, sums_by_label, unique_edges, vertex_components, welded
 
 # Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
 _MOST_SHARE = 0.5
@@ -52,8 +53,7 @@ def mirrored_share(pair: KeyPair) -> float:
     is_closed = np.zeros(len(first), dtype=bool)
     is_closed[labels[closed.faces[:, 0]]] = True
     mirrored = np.where(is_closed, first * second < 0.0, _are_mirror_images(keys[0], keys[1], labels))
-    corners = keys[0][faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = np.linalg.norm(face_normals(keys[0], faces), axis=1)
     total = float(areas.sum())
     return float(areas[mirrored[labels[faces[:, 0]]]].sum()) / total if total > 0.0 else 0.0
 
@@ -66,12 +66,12 @@ def _in_unit_size(key: Floats) -> Floats:
 def _are_mirror_images(key0: Floats, key1: Floats, labels: Ints) -> Bools:
     """(components,) whether a reflection carries a component onto the other key, and no turn does."""
     counts = np.maximum(np.bincount(labels), 1)
-    spread = [key - (_summed(labels, key) / counts[:, None])[labels] for key in (key0, key1)]
-    sizes = [np.sqrt(_summed(labels, (points**2).sum(axis=1)[:, None])[:, 0]) for points in spread]
+    spread = [key - (sums_by_label(labels, key) / counts[:, None])[labels] for key in (key0, key1)]
+    sizes = [np.sqrt(sums_by_label(labels, (points**2).sum(axis=1)[:, None])[:, 0]) for points in spread]
     products = (spread[1][:, :, None] * spread[0][:, None, :]).reshape(-1, 9)
     scale = sizes[0] * sizes[1]
     usable = scale > 0.0
-    covariances = _summed(labels, products)[usable] / scale[usable, None]
+    covariances = sums_by_label(labels, products)[usable] / scale[usable, None]
     left, kept, right = np.linalg.svd(covariances.reshape(-1, 3, 3))
     is_odd = np.linalg.det(left) * np.linalg.det(right) < 0.0
     by_turn = _left_over(kept[:, 0] + kept[:, 1] - kept[:, 2])
@@ -83,8 +83,3 @@ def _are_mirror_images(key0: Floats, key1: Floats, labels: Ints) -> Bools:
 
 def _left_over(kept: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(1.0 - kept**2, 0.0)))
-
-
-def _summed(labels: Ints, values: Floats) -> Floats:
-    """(components, c) sums of the rows of ``values`` (n, c)."""
-    return np.stack([np.bincount(labels, weights=column) for column in values.T], axis=1)

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from .surface import cross_product
 from .tetmesh import Floats, Ints
-from .topology import closed_faces
+from .topology import closed_faces, distinct
 
 
 class ClosedComponents:
@@ -69,7 +69,7 @@ class MovingVolumes:
         number[used] = np.arange(len(used))
         self._corners: Ints = np.ascontiguousarray(number[faces].T)
         # Each component is seen from one of its corners, one that rests if there is one: what rests looks the same.
-        corners = np.unique(faces)
+        corners = distinct(faces.ravel())
         corners = corners[np.lexsort((moves[corners], closed.labels[corners]))]
         labels, first = np.unique(closed.labels[corners], return_index=True)
         self._components = int(closed.labels.max(initial=-1)) + 1

@@ -21,6 +21,7 @@ from .factorization import dissection_order, factored
 from .stiffness import StiffnessPattern, stiffness_elements
 from .surface import TriangleDeformation, closest_tangents, gradient_operator, stretched
 from .tetmesh import Bools, Floats, Ints
+from .topology import distinct
 
 # Fixed weights: shapes have not settled fully, and what adaptive weights make of them jumps from one time to the next.
 _RADIUS = 0.95
@@ -79,7 +80,7 @@ class MovingSurface:
         moving = np.flatnonzero(free)
         moving = moving[dissection_order(points[moving], csr_array(stiffness[moving][:, moving]))]
         touched = closed.faces[free[closed.faces].any(axis=1)]
-        beside = np.unique(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
+        beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
         beside = beside[~free[beside]]
         self.moving, self.used = moving, np.concatenate([moving, beside])
         number = np.zeros(count, dtype=np.int64)

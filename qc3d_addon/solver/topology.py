@@ -36,12 +36,18 @@ def sides(faces: Ints) -> Ints:
     return np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
 
 
+def distinct(numbers: Ints) -> Ints:
+    """(k,) the numbers (n,) without repetition, sorted; many times faster than numpy's hashing from version 2.3 on."""
+    ordered = np.sort(numbers)
+    return ordered[np.diff(ordered, prepend=ordered[:1] - 1) > 0]
+
+
 def unique_edges(edges: Ints) -> Ints:
     """(k, 2) edges without repetition and without loops."""
     low, high = edges.min(axis=1), edges.max(axis=1)
     span = int(high.max(initial=0)) + 1
     # One number for each edge sorts several times faster than pairs.
-    codes = np.unique((low * span + high)[low != high])
+    codes = distinct((low * span + high)[low != high])
     return np.stack([codes // span, codes % span], axis=1)
 
 

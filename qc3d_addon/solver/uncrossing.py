@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 
-from .crossings import crossing_pairs
+from .crossings import CrossingSearch
 from .tetmesh import Bools, Floats, Ints
 from .topology import sides
 
@@ -29,7 +29,7 @@ class CrossingLimit:
     def __init__(self, faces: Ints, key0: Floats, key1: Floats, still: Bools) -> None:
         self._faces = faces
         # Where neither triangle moves, nothing changes between the keys.
-        self._moving = ~still[faces].all(axis=1)
+        self._search = CrossingSearch(faces, (key0, key1), ~still[faces].all(axis=1))
         in_keys = [self._codes(key) for key in (key0, key1)]
         self._known = np.concatenate(in_keys)
         self._allowed = max(len(codes) for codes in in_keys)
@@ -62,5 +62,5 @@ class CrossingLimit:
 
     def _codes(self, shape: Floats) -> Ints:
         """One number for each crossing pair of triangles of which one moves."""
-        pairs = crossing_pairs(shape, self._faces, self._moving)
+        pairs = self._search.pairs(shape)
         return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])

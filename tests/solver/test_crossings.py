@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qc3d_addon.solver import crossings
+from qc3d_addon.solver import triangle_tree
 from qc3d_addon.solver.crossings import crossing_pairs
 from qc3d_addon.solver.rotations import rotation_matrices
 from qc3d_addon.solver.tetmesh import Floats, Ints
@@ -116,7 +116,7 @@ def test_small_chunks_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = crossing_pairs(points, triangles(20))
     assert len(expected) > 10
     for chunk in (1, 7, 50):
-        monkeypatch.setattr(crossings, "_CHUNK", chunk)
+        monkeypatch.setattr(triangle_tree, "_CHUNK", chunk)
         np.testing.assert_array_equal(crossing_pairs(points, triangles(20)), expected)
 
 

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from .rotations import nearest_branch, rotation_matrices, rotation_vectors
+from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 from .tetmesh import Bools, Floats, Ints
 
 _MOST_SWING = 1.55 * np.pi
@@ -44,7 +44,7 @@ class Turning:
         """(m, 3, 3) rotations at ``time`` in 0..1; ``change`` (m, 3) is added to the swing's rotation vector."""
         rotations = rotation_matrices(time * self.swing + change)
         if self.twist.any():
-            rotations = rotations @ rotation_matrices(time * self.twist)
+            rotations = products(rotations, rotation_matrices(time * self.twist))
         return rotations
 
     @property

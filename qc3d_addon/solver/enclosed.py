@@ -75,7 +75,8 @@ class MovingVolumes:
         self._components = int(closed.labels.max(initial=-1)) + 1
         self._views = np.zeros(self._components, dtype=np.int64)
         self._views[labels] = corners[first]
-        self._view_of_face = number[self._views[self._label_of_face]]
+        # The corners of each triangle, and where it is seen from.
+        self._looked_at = np.concatenate([self._corners, number[self._views[self._label_of_face]][None]])
         flat = self._corners.ravel()
         free = np.flatnonzero(flat < len(moving))
         entries = (flat[free], free % max(1, self._corners.shape[1]))
@@ -98,9 +99,9 @@ class MovingVolumes:
         positions : (3, l)
             Of the used vertices.
         """
-        first, second, third = (positions[:, corner] for corner in self._corners)
+        first, second, third, view = np.stack([coordinate[self._looked_at] for coordinate in positions], axis=1)
         normals = cross_product(second - first, third - first)
-        first -= positions[:, self._view_of_face]
+        first -= view
         shares = (first * normals).sum(axis=0)
         volumes = np.bincount(self._label_of_face, weights=shares, minlength=self._components) / 6.0
         return volumes, np.stack([self._incidence @ normal for normal in normals]) / 6.0

@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, cg
 
 from .rotations import cofactors, determinants
-from .stiffness import StiffnessPattern, scatter
+from .stiffness import StiffnessPattern
 from .tetmesh import Bools, Floats, TetMesh
 
 LANDMARK_WEIGHT = 1e4
@@ -89,16 +89,15 @@ class FoldFreeFitter:
     def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
         """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3)."""
         jacobians = self.mesh.jacobians(values)
-        volumes, gradients = self.mesh.volumes, self.mesh.gradients
+        volumes = self.mesh.volumes
         squares = np.einsum("mij,mij->m", jacobians, jacobians)
         cofactor = cofactors(jacobians)
         terms = _density_derivatives(squares, determinants(jacobians))
         stress = terms.linear[:, None, None] * jacobians + terms.slope[:, None, None] * cofactor
-        force = volumes[:, None, None] * (gradients @ stress.transpose(0, 2, 1))
         missed, misfit_gradient = misfit.at(values)
-        gradient = scatter(self.mesh.tets, force, len(values)) + misfit_gradient
+        gradient = self.mesh.divergence(volumes[:, None, None] * stress) + misfit_gradient
         gradient[~self._free] = 0.0
-        blocks = _projected_blocks(volumes, gradients, jacobians, cofactor, squares, terms)
+        blocks = _projected_blocks(volumes, self.mesh.gradients, jacobians, cofactor, squares, terms)
         return float(volumes @ terms.density) + missed, gradient, blocks
 
     def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:

@@ -50,7 +50,7 @@ class NaturalFrames:
         if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         turning = _turning_inside(prepared, self._surface)
-        self._volume = VolumePath(mesh, prepared.mapped, turning, prepared.insideness, law)
+        self._volume = VolumePath(mesh, prepared.maps, turning, prepared.insideness, law)
         self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1, self.still)
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
@@ -130,9 +130,14 @@ class NaturalFrames:
     def _certified(self, moment: tuple[float, Floats, Floats, int]) -> Frame:
         """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
         time, values, positions, crossings = moment
-        folded = self._prepared.folds(values) > 0
-        unfolded = self._prepared.unfolded(values, time) if folded else values
-        return Frame.of(self._prepared, self._placed(positions, time), unfolded, time, folded, crossings)
+        # The maps that were fitted on the way lead nearer to the surface, and past most folds.
+        found = self._volume.followed(time, values)
+        repaired = self._prepared.folds(found) > 0
+        if repaired and not self._prepared.folds(values):
+            found, repaired = values, False
+        if repaired:
+            found = self._prepared.unfolded(found, time)
+        return Frame.of(self._prepared, self._placed(positions, time), found, time, repaired, crossings)
 
     def _first_try(self, time: float) -> tuple[Floats, Floats, int]:
         """Values (N, 3) of the map at ``time``, the surface's cube positions (n, 3), and their excess of crossings."""

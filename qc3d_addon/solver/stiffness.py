@@ -56,11 +56,3 @@ def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats 
     """(M, k, k) element matrices v G A G^T of the operator -div(A grad); A = identity where it is not given."""
     flux = gradients if conductivity is None else gradients @ conductivity
     return np.asarray(volumes[:, None, None] * (flux @ gradients.transpose(0, 2, 1)))
-
-
-def scatter(elements: Ints, values: Floats, count: int) -> Floats:
-    """(count, 3) sums over elements of corner values (m, k, 3)."""
-    flat = elements.ravel()
-    return np.stack(
-        [np.bincount(flat, weights=values[:, :, axis].ravel(), minlength=count) for axis in range(3)], axis=1
-    )

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from .rotations import by_component, products
 from .tetmesh import Floats
 
 StretchLaw = Literal["linear", "logarithmic"]
@@ -17,7 +18,7 @@ _FLATTEST = 1e-16
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Symmetric positive definite matrices by their eigenvalues (m, d) and eigenvectors (m, d, d)."""
+    """Symmetric positive definite matrices by their eigenvalues (m, d) and eigenvectors (m, d, d), by component."""
 
     values: Floats
     vectors: Floats
@@ -27,7 +28,7 @@ class Stretch:
         """Decompose (m, d, d) symmetric positive definite matrices."""
         values, vectors = np.linalg.eigh(matrices)
         # Where something is flattened as far as numbers go, rounding must not make it negative.
-        return cls(np.maximum(values, _FLATTEST * values[:, -1:]), vectors)
+        return cls(by_component(np.maximum(values, _FLATTEST * values[:, -1:])), by_component(vectors))
 
     def at(self, time: float, law: StretchLaw) -> Floats:
         """(m, d, d) stretches at ``time``: (1 - t) I + t P, or exp(t log P); positive definite for t in 0..1."""
@@ -35,4 +36,4 @@ class Stretch:
 
     def assembled(self, values: Floats) -> Floats:
         """(m, d, d) symmetric matrices with these eigenvectors and other eigenvalues (m, d)."""
-        return np.asarray((self.vectors * values[:, None, :]) @ self.vectors.transpose(0, 2, 1))
+        return products(self.vectors * values[:, None, :], self.vectors.transpose(0, 2, 1))

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from .errors import MeshingError
 
@@ -87,9 +88,24 @@ class TetMesh:
         """(N, 3): whether coordinate c of a vertex is exactly 0 or 1, that is, held by the sliding boundary."""
         return np.asarray((self.points == 0.0) | (self.points == 1.0))
 
+    @cached_property
+    def gradient_operator(self) -> csr_array:
+        """(3M, N): takes a coordinate of a map (N,) to its derivatives along x on all tetrahedra, then y, then z."""
+        starts = np.arange(0, 12 * len(self.tets) + 1, 4)
+        columns = np.concatenate([self.tets] * 3).ravel()
+        return csr_array(
+            (self.gradients.transpose(2, 0, 1).ravel(), columns, starts), shape=(3 * len(self.tets), len(self.points))
+        )
+
     def jacobians(self, values: Floats) -> Floats:
-        """(M, 3, 3) Jacobians of the piecewise linear map that sends ``points`` to ``values`` (N, 3)."""
-        return np.asarray(np.einsum("mka,mkb->mab", values[self.tets], self.gradients, optimize=True))
+        """(M, 3, 3) Jacobians, stored by component, of the map that sends ``points`` to ``values`` (N, 3)."""
+        rows = [self.gradient_operator @ coordinate for coordinate in np.ascontiguousarray(values.T)]
+        return np.asarray(np.moveaxis(np.stack(rows).reshape(3, 3, -1), -1, 0))
+
+    def divergence(self, fields: Floats) -> Floats:
+        """(N, 3): what fields (M, 3, 3) of row vectors, weighted, give to the vertices; ``jacobians`` transposed."""
+        rows = np.moveaxis(fields, 0, -1).reshape(3, -1)
+        return np.stack([self.gradient_operator.T @ row for row in rows], axis=1)
 
 
 def edge_matrices(points: Floats, tets: Ints) -> Floats:

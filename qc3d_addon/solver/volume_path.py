@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csr_array
 
 from .branches import Turning
 from .factorization import dissection_order, factored
+from .parallel import in_threads
 from .representation import polar_decomposition
-from .stiffness import StiffnessPattern, scatter, stiffness_elements
+from .rotations import products
+from .stiffness import StiffnessPattern, stiffness_elements
 from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, TetMesh
 
@@ -24,8 +28,8 @@ class VolumePath:
     Parameters
     ----------
     mesh : TetMesh
-    mapped : (N, 3)
-        The fitted map, without folds.
+    maps : (K + 1, N, 3)
+        Maps without folds that were fitted on the way, evenly spaced in time: the identity first, the fitted map last.
     turning : Turning
         How the tetrahedra turn.
     insideness : (M,)
@@ -33,29 +37,43 @@ class VolumePath:
     law : StretchLaw
     """
 
-    def __init__(self, mesh: TetMesh, mapped: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
+    def __init__(self, mesh: TetMesh, maps: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
         self._mesh = mesh
+        self._maps = maps
         self._turning = turning
-        self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(mapped)).stretch)
+        self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(maps[-1])).stretch)
         self._law = law
-        weights = mesh.volumes * insideness
-        self._weighted_gradients = weights[:, None, None] * mesh.gradients
-        matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(stiffness_elements(weights, mesh.gradients))
-        self._held = mesh.on_cube_face
+        self._weights = mesh.volumes * insideness
+        elements = stiffness_elements(self._weights, mesh.gradients)
+        matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(elements)
+        held = mesh.on_cube_face
         order = dissection_order(mesh.points, matrix)
         self._systems = []
         for coordinate in range(3):
-            held = np.flatnonzero(self._held[:, coordinate])
-            free = order[~self._held[order, coordinate]]
+            resting = np.flatnonzero(held[:, coordinate])
+            free = order[~held[order, coordinate]]
             rows = matrix[free]
-            held_load = rows[:, held] @ mesh.points[held, coordinate]
+            held_load = rows[:, resting] @ mesh.points[resting, coordinate]
             self._systems.append((free, factored(csr_array(rows[:, free])), held_load))
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
-        wanted = self._turning.at(time) @ self._stretch.at(time, self._law)
-        load = scatter(self._mesh.tets, self._weighted_gradients @ wanted.transpose(0, 2, 1), len(self._mesh.points))
+        wanted = products(self._turning.at(time), self._stretch.at(time, self._law))
+        load = self._mesh.divergence(self._weights[:, None, None] * wanted)
         values = self._mesh.points.copy()
         for coordinate, (free, factors, held_load) in enumerate(self._systems):
             values[free, coordinate] = factors.solve(load[free, coordinate] - held_load)
         return values
+
+    def followed(self, time: float, values: Floats) -> Floats:
+        """(N, 3): ``values`` at ``time`` with what this path misses of the nearest fitted maps, before and after."""
+        steps = len(self._maps) - 1
+        before = min(int(time * steps), steps - 1)
+        part = time * steps - before
+        return np.asarray(values + (1.0 - part) * self._missed[before] + part * self._missed[before + 1])
+
+    @cached_property
+    def _missed(self) -> Floats:
+        """(K + 1, N, 3): the fitted maps minus this path."""
+        times = np.linspace(0.0, 1.0, len(self._maps))
+        return np.asarray(self._maps - np.stack(list(in_threads(self.at, times.tolist()))))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qc3d_addon.solver.stiffness import StiffnessPattern, scatter, stiffness_elements
+from qc3d_addon.solver.stiffness import StiffnessPattern, stiffness_elements
 from qc3d_addon.solver.tetmesh import Ints, TetMesh
 
 from .meshes import icosphere, jittered_grid
@@ -37,11 +37,14 @@ def test_block_assembly_against_dense_sums() -> None:
     np.testing.assert_allclose(found.toarray(), dense, rtol=0.0, atol=1e-13)
 
 
-def test_scatter_against_dense_sums() -> None:
-    values = np.random.default_rng(0).normal(size=(len(MESH.tets), 4, 3))
-    expected = np.zeros((len(MESH.points) + 2, 3))
-    np.add.at(expected, MESH.tets, values)
-    np.testing.assert_allclose(scatter(MESH.tets, values, len(expected)), expected, rtol=0.0, atol=1e-14)
+def test_jacobians_of_linear_maps_and_their_transpose() -> None:
+    random = np.random.default_rng(0)
+    linear, fields = random.normal(size=(3, 3)), random.normal(size=(len(MESH.tets), 3, 3))
+    everywhere = np.broadcast_to(linear, (len(MESH.tets), 3, 3))
+    np.testing.assert_allclose(MESH.jacobians(MESH.points @ linear.T + 0.3), everywhere, rtol=0.0, atol=1e-12)
+    expected = np.zeros(MESH.points.shape)
+    np.add.at(expected, MESH.tets, MESH.gradients @ fields.transpose(0, 2, 1))
+    np.testing.assert_allclose(MESH.divergence(fields), expected, rtol=0.0, atol=1e-11)
 
 
 def energy_matrix(mesh: TetMesh, conductivity: np.ndarray) -> np.ndarray:

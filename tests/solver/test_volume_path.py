@@ -20,7 +20,8 @@ from .meshes import jittered_grid, kuhn_grid
 
 def path_of(mesh: TetMesh, values: Floats, inside: Floats, law: StretchLaw = "linear") -> VolumePath:
     turns = rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation)
-    return VolumePath(mesh, values, Turning(turns, np.zeros_like(turns)), insideness(inside), law)
+    maps = np.stack([mesh.points, values])
+    return VolumePath(mesh, maps, Turning(turns, np.zeros_like(turns)), insideness(inside), law)
 
 
 def whirled(points: Floats, angle: float) -> Floats:
@@ -88,7 +89,8 @@ def test_a_twist_by_whole_turns_ends_where_none_does(turns: int) -> None:
     axis = np.array([0.0, 0.6, 0.8])
     twist = np.where(core[:, None], (0.7 + 2.0 * np.pi * turns) * axis, 0.0)
     swing = rotation_vectors(rotations @ rotation_matrices(-twist))
-    path = VolumePath(mesh, values, Turning(swing, twist), insideness(core.astype(np.float64)), "linear")
+    maps = np.stack([mesh.points, values])
+    path = VolumePath(mesh, maps, Turning(swing, twist), insideness(core.astype(np.float64)), "linear")
     np.testing.assert_allclose(path.at(0.0), mesh.points, rtol=0.0, atol=1e-11)
     np.testing.assert_allclose(path.at(1.0), values, rtol=0.0, atol=1e-11)
     middle = np.linalg.norm(mesh.points - 0.5, axis=1) < 0.1
@@ -103,3 +105,19 @@ def test_close_times_give_close_maps() -> None:
     steps = np.abs(np.diff(values, axis=0)).max(axis=(1, 2))
     assert steps.max() < 1.5 * steps.mean()
     assert np.abs(np.diff(values, n=2, axis=0)).max() < 2.0 * steps.mean() / 16.0
+
+
+def test_the_maps_fitted_on_the_way_are_met_and_shared_between() -> None:
+    mesh = jittered_grid(6, seed=7)
+    values = whirled(mesh.points, 0.8)
+    turns = rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation)
+    # Some way that interpolation does not take.
+    bump = 0.01 * np.sin(np.pi * mesh.points) * ~mesh.on_cube_face
+    maps = np.stack([mesh.points, whirled(mesh.points, 0.3) + bump, whirled(mesh.points, 0.6) - bump, values])
+    path = VolumePath(mesh, maps, Turning(turns, np.zeros_like(turns)), insideness(np.ones(len(mesh.tets))), "linear")
+    for step, fitted in enumerate(maps):
+        np.testing.assert_allclose(path.followed(step / 3, path.at(step / 3)), fitted, rtol=0.0, atol=1e-11)
+    missed = [fitted - path.at(step / 3) for step, fitted in enumerate(maps)]
+    between = path.at(0.5)
+    expected = between + 0.5 * (missed[1] + missed[2])
+    np.testing.assert_allclose(path.followed(0.5, between), expected, rtol=0.0, atol=1e-12)

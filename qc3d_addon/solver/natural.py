@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,7 +15,7 @@ from scipy.spatial import cKDTree
 from .branches import Turning, swing_beside
 from .colliders import Guard
 from .frame import Frame
-from .parallel import in_threads
+from .parallel import batches, in_threads
 from .prepared import PreparedMap
 from .rates import Rates, hermite
 from .spins import ExtraSpins
@@ -109,16 +110,18 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
-        return self._placed(self._shaped(self._surface, self._volume.at(time), time), time)
+        return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
 
     def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, kept off by ``guard``; yields the part that is done."""
-        volumes, positions, excess = [], [], []
+        volumes: list[Floats] = []
+        positions: list[Floats] = []
+        excess: list[int] = []
         yield 0.0
-        for values, shape, crossing in in_threads(self._first_try, times.tolist()):
-            volumes.append(values)
-            positions.append(shape)
-            excess.append(crossing)
+        for maps, shapes, crossing in in_threads(self._first_try, batches(times.tolist())):
+            volumes.extend(maps)
+            positions.extend(shapes)
+            excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
         if guard is not None:
@@ -139,11 +142,11 @@ class NaturalFrames:
             found = self._prepared.unfolded(found, time)
         return Frame.of(self._prepared, self._placed(positions, time), found, time, repaired, crossings)
 
-    def _first_try(self, time: float) -> tuple[Floats, Floats, int]:
-        """Values (N, 3) of the map at ``time``, the surface's cube positions (n, 3), and their excess of crossings."""
-        values = self._volume.at(time)
-        shape = self._shaped(self._surface, values, time)
-        return values, shape, self._limit.excess(shape)
+    def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int]]:
+        """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
+        maps = self._volume.maps_at(times)
+        shapes = self._shaped(self._surface, self._moments(maps, times))
+        return maps, shapes, [self._limit.excess(shape) for shape in shapes]
 
     def _placed(self, shape: Floats, time: float) -> Floats:
         """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
@@ -154,16 +157,23 @@ class NaturalFrames:
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
 
-    def _shaped(self, surface: SurfacePath, values: Floats, time: float) -> Floats:
-        """(n, 3) cube positions of a surface drawn to a map of the cube, its extra turns added."""
-        return self._spins.apply(surface.positions(time, self._anchor(values, time)), time)
+    def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
+        """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
+        return [
+            self._spins.apply(shape, time)
+            for (time, _), shape in zip(moments, surface.shapes(moments), strict=True)
+        ]
 
-    def _shaped_at(self, surface: SurfacePath, moment: tuple[Floats, float]) -> Floats:
-        return self._shaped(surface, *moment)
+    def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
+        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), batches(moments))))
 
-    def _anchor(self, values: Floats, time: float) -> Floats:
-        """(n, 3): the landmarks of a map, what it misses at the two keys blended in."""
-        return np.asarray(self._prepared.landmarks @ values + (1.0 - time) * self._missed[0] + time * self._missed[1])
+    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
+        """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
+        landmarks, missed = self._prepared.landmarks, self._missed
+        return [
+            (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
+            for values, time in zip(maps, times, strict=True)
+        ]
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int]
@@ -180,13 +190,12 @@ class NaturalFrames:
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = list(in_threads(partial(self._shaped_at, surface), zip(volumes, times.tolist(), strict=True)))
+            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
             remaining = list(in_threads(self._limit.excess, tried))
             if sum(remaining) >= sum(excess):
                 break
             positions, excess = tried, remaining
         return positions, excess
-
 
     def _kept_off(
         self, guard: Guard, times: Floats, volumes: list[Floats], positions: list[Floats]
@@ -212,10 +221,14 @@ class NaturalFrames:
             for near in nearby:
                 reach = np.maximum(reach, self._limit.faded(near))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            positions = [
-                surface.positions(time, np.where(reach[:, None] > 0.0, push, self._anchor(values, time)))
-                for time, values, push in zip(moments, volumes, pushed, strict=True)
-            ]
+            anchored = self._moments(volumes, moments)
+            positions = self._all_shaped(
+                surface,
+                [
+                    (time, np.where(reach[:, None] > 0.0, push, anchor))
+                    for (time, anchor), push in zip(anchored, pushed, strict=True)
+                ],
+            )
         return positions
 
 

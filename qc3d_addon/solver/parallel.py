@@ -6,13 +6,15 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+# So many shapes are solved for together: more save little, and wait for each other.
+_BATCH = 4
 # Beyond this the interpreter's lock and the memory's bandwidth leave nothing to gain.
 _MOST_THREADS = 4
 
@@ -21,6 +23,12 @@ def thread_count() -> int:
     """How many pieces of work run at once: the cores that this process may use, at most four."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(cores, _MOST_THREADS)
+
+
+def batches(items: Sequence[Item]) -> list[Sequence[Item]]:
+    """Items a few at a time, but no fewer batches than threads."""
+    size = max(1, min(_BATCH, -(-len(items) // thread_count())))
+    return [items[start : start + size] for start in range(0, len(items), size)]
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:

@@ -13,7 +13,7 @@ _SMALL_ANGLE = 1e-4
 
 
 def by_component(matrices: Floats) -> Floats:
-    """The same array (k, ...), stored so that each component lies in one piece: operations on all k run along memory."""
+    """The same array (k, ...), each component stored in one piece: operations on all k run along memory."""
     return np.asarray(np.moveaxis(np.ascontiguousarray(np.moveaxis(matrices, 0, -1)), -1, 0))
 
 

@@ -9,8 +9,10 @@ of vertices and triangles are stored by coordinate, (3, n), so that every operat
 from __future__ import annotations
 
 import copy
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
@@ -30,6 +32,10 @@ _SETTLED = 1e-10  # cube units
 _LARGEST_VOLUME_STEP = 0.1
 _LAST_VOLUME_STEPS = 12
 _VOLUME_TOLERANCE = 1e-12
+
+Result = TypeVar("Result")
+# Work that yields loads (3, k) and is sent their solutions.
+Solving = Generator[Floats, Floats, Result]
 
 
 class MovingSurface:
@@ -132,7 +138,7 @@ class Wanted:
 
 
 class Sweeps:
-    """The sweeps of one shape.
+    """The sweeps of one shape; loads of the system go out, solutions come in, so that shapes can be solved together.
 
     Parameters
     ----------
@@ -152,20 +158,22 @@ class Sweeps:
         self._anchors = np.ascontiguousarray(wanted.anchors[surface.moving].T)
         self._missing_volumes = wanted.volumes - surface.volumes.resting(start)
         self._largest_volume_step = _LARGEST_VOLUME_STEP * np.abs(wanted.volumes)
+        self._volume_direction: Floats | None = None
 
-    def settled(self, tangents: Floats, sweeps: int) -> Floats:
+    def settling(self, tangents: Floats, sweeps: int) -> Solving[Floats]:
         """(n, 3) positions after so many sweeps; the first fit is to ``tangents`` (3, 2, m)."""
         settled = self._start.copy()
         if len(self._surface.moving):
             iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
-            self._move(self._corrected(tangents))
+            self._move((yield from self._corrected(tangents)))
             for _ in range(sweeps - 1):
-                present, refitted = self._moved.copy(), self._refitted()
+                present = self._moved.copy()
+                refitted = yield from self._refitted()
                 if np.abs(refitted - present).max() <= _SETTLED:  # else rounding would be amplified
                     break
                 self._move(iteration.next(present, refitted))
-            self._move(self._corrected(closest_tangents(self._stretched_gradients())))
-            self._restore_volumes()
+            self._move((yield from self._corrected(closest_tangents(self._stretched_gradients()))))
+            yield from self._restore_volumes()
             settled[self._surface.moving] = self._moved.T
         return settled
 
@@ -189,18 +197,23 @@ class Sweeps:
             self._surface.anchor_weights * self._anchors - _applied(self._surface.stiffness_beside, resting)
         )
 
+    @cached_property
+    def _spread(self) -> csc_array:
+        """(k, 2m): takes tangents to what they give to the moving vertices, stretched gradients transposed."""
+        return self._stretched_gradient[:, self._moving].T
+
     def _stretched_gradients(self) -> Floats:
         return _applied(self._stretched_gradient, self._positions).reshape(3, 2, -1)
 
-    def _refitted(self) -> Floats:
+    def _refitted(self) -> Solving[Floats]:
         """Positions (3, k) fitted to the rotations that the present ones ask for."""
         tangents = closest_tangents(self._stretched_gradients(), self._surface.weights)
-        load = _applied(self._stretched_gradient.T, tangents.reshape(3, -1))[:, self._moving] + self._constant_load
+        load = _applied(self._spread, tangents.reshape(3, -1)) + self._constant_load
         if len(self._wanted.lengths):
             load += _applied(self._surface.spans.T, self._wanted_spans())[:, self._moving]
-        return self._with_volumes(self._surface.solve(load))
+        return (yield from self._with_volumes((yield load)))
 
-    def _corrected(self, tangents: Floats) -> Floats:
+    def _corrected(self, tangents: Floats) -> Solving[Floats]:
         """Positions (3, k) fitted to tangents (3, 2, m), solved for the change.
 
         Where the present positions are right, needles and tiny parts do not spoil them.
@@ -213,7 +226,7 @@ class Sweeps:
         if len(self._wanted.lengths):
             missing_spans = self._wanted_spans() - _applied(surface.spans, self._positions)
             load += _applied(surface.spans.T, missing_spans)[:, self._moving]
-        return self._moved + surface.solve(load)
+        return np.asarray(self._moved + (yield load))
 
     def _wanted_spans(self) -> Floats:
         """(3, s) the springs as long as they should be, in their present directions."""
@@ -221,25 +234,26 @@ class Sweeps:
         present = np.sqrt((spans**2).sum(axis=0))
         return np.asarray(spans * np.where(present > 1e-12, self._wanted.lengths / np.maximum(present, 1e-12), 0.0))
 
-    def _with_volumes(self, moved: Floats) -> Floats:
+    def _with_volumes(self, moved: Floats) -> Solving[Floats]:
         """Positions (3, k) moved on until, to first order, every closed component has its volume."""
         volumes = self._surface.volumes
         if volumes.empty:
             return moved
         enclosed, slope = volumes.with_slope(self._positions)
         missing = self._missing_volumes - enclosed - volumes.changes(slope, moved - self._moved)
-        return volumes.stepped(moved, self._volume_direction, slope, self._limited(missing))
+        return volumes.stepped(moved, (yield from self._direction(slope)), slope, self._limited(missing))
 
-    @cached_property
-    def _volume_direction(self) -> Floats:
+    def _direction(self, slope: Floats) -> Solving[Floats]:
         """(3, k) K^-1 grad V where it is first asked for; the shape changes too little for it to be worth renewing."""
-        return self._surface.solve(self._surface.volumes.with_slope(self._positions)[1])
+        if self._volume_direction is None:
+            self._volume_direction = yield slope
+        return self._volume_direction
 
     def _limited(self, missing: Floats) -> Floats:
         # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
         return np.clip(missing, -self._largest_volume_step, self._largest_volume_step)
 
-    def _restore_volumes(self) -> None:
+    def _restore_volumes(self) -> Solving[None]:
         """Steps along K^-1 grad V until every closed component has its volume."""
         volumes = self._surface.volumes
         if volumes.empty:
@@ -249,7 +263,26 @@ class Sweeps:
             missing = self._missing_volumes - enclosed
             if (np.abs(missing) <= _VOLUME_TOLERANCE * np.abs(self._wanted.volumes)).all():
                 break
-            self._move(volumes.stepped(self._moved, self._volume_direction, slope, self._limited(missing)))
+            direction = yield from self._direction(slope)
+            self._move(volumes.stepped(self._moved, direction, slope, self._limited(missing)))
+
+
+def solved_together(surface: MovingSurface, shapes: Sequence[Solving[Floats]]) -> list[Floats]:
+    """What each of ``shapes`` returns. They go on in step: the factors pass through memory once for all their loads."""
+    results: dict[int, Floats] = {}
+    answers: dict[int, Floats | None] = dict.fromkeys(range(len(shapes)))
+    while answers:
+        loads: dict[int, Floats] = {}
+        for number, answer in answers.items():
+            try:
+                loads[number] = next(shapes[number]) if answer is None else shapes[number].send(answer)
+            except StopIteration as end:
+                results[number] = end.value
+        if not loads:
+            break
+        solutions = surface.solve(np.concatenate(list(loads.values())))
+        answers = dict(zip(loads, np.split(solutions, len(loads)), strict=True))
+    return [results[number] for number in range(len(shapes))]
 
 
 def _applied(matrix: csr_array | csc_array, coordinates: Floats) -> Floats:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.sparse import csr_array
 
 from .branches import Turning
 from .factorization import dissection_order, factored
-from .parallel import in_threads
+from .parallel import batches, in_threads
 from .representation import polar_decomposition
 from .rotations import products
 from .stiffness import StiffnessPattern, stiffness_elements
@@ -58,12 +59,19 @@ class VolumePath:
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
-        wanted = products(self._turning.at(time), self._stretch.at(time, self._law))
-        load = self._mesh.divergence(self._weights[:, None, None] * wanted)
-        values = self._mesh.points.copy()
+        return np.asarray(self.maps_at([time])[0])
+
+    def maps_at(self, times: Sequence[float]) -> Floats:
+        """(k, N, 3) values of the maps at several times, solved together: the factors pass through memory once."""
+        loads = np.stack([self._load(time) for time in times])
+        values = np.tile(self._mesh.points, (len(times), 1, 1))
         for coordinate, (free, factors, held_load) in enumerate(self._systems):
-            values[free, coordinate] = factors.solve(load[free, coordinate] - held_load)
+            values[:, free, coordinate] = factors.solve((loads[:, free, coordinate] - held_load).T).T
         return values
+
+    def _load(self, time: float) -> Floats:
+        wanted = products(self._turning.at(time), self._stretch.at(time, self._law))
+        return self._mesh.divergence(self._weights[:, None, None] * wanted)
 
     def followed(self, time: float, values: Floats) -> Floats:
         """(N, 3): ``values`` at ``time`` with what this path misses of the nearest fitted maps, before and after."""
@@ -76,4 +84,4 @@ class VolumePath:
     def _missed(self) -> Floats:
         """(K + 1, N, 3): the fitted maps minus this path."""
         times = np.linspace(0.0, 1.0, len(self._maps))
-        return np.asarray(self._maps - np.stack(list(in_threads(self.at, times.tolist()))))
+        return np.asarray(self._maps - np.concatenate(list(in_threads(self.maps_at, batches(times.tolist())))))

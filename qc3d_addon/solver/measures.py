@@ -16,6 +16,7 @@ from .keypair import KeyPair
 from .parallel import in_threads
 from .prepared import PreparedMap
 from .tetmesh import Floats, Ints
+from .topology import sides, unique_edges
 
 # Ratios beyond this say no more than that something is flat.
 _MOST = 1e6
@@ -86,9 +87,15 @@ class VertexMeasures:
     def __init__(self, prepared: Sequence[PreparedMap]) -> None:
         self._prepared = prepared
         self._count = len(prepared[0].pair.key0)
-        self._faces = prepared[0].pair.faces
-        self._triangles = TriangleStretches(prepared[0].pair.key0, self._faces)
-        self._averages = [_average_at_landmarks(part) for part in prepared]
+        faces = prepared[0].pair.faces
+        self._triangles = TriangleStretches(prepared[0].pair.key0, faces)
+        # Triangles in the order of their corners, and where each vertex that has any begins.
+        corners = faces.ravel()
+        order = np.argsort(corners, kind="stable")
+        self._triangles_around = order // 3
+        self._starts = np.flatnonzero(np.diff(corners[order], prepend=-1))
+        self._with_triangles = corners[order][self._starts]
+        self._averages = [_LandmarkAverages(part) for part in prepared]
         self._before = [np.broadcast_to(np.eye(3), (self._count, 3, 3))]
         for number, part in enumerate(prepared[:-1]):
             whole = part.embedding.motion.rotation @ self._jacobians(number, part.mapped)
@@ -113,27 +120,34 @@ class VertexMeasures:
 
     def _jacobians(self, number: int, values: Floats) -> Floats:
         """(n, 3, 3) Jacobians around the vertices of a map of the cube (N, 3)."""
-        jacobians = self._prepared[number].mesh.jacobians(values)
-        return np.asarray((self._averages[number] @ jacobians.reshape(-1, 9)).reshape(-1, 3, 3))
+        return self._averages[number].of(self._prepared[number].mesh.jacobians(values))
 
     def _at_vertices(self, ratios: Floats) -> Floats:
         """(n,) the ratio of the triangles (m,) around each vertex that is farthest from 1; 1 where there are none."""
         logarithms = np.nan_to_num(np.log(np.clip(ratios, 1.0 / _MOST, _MOST)))
-        largest, smallest = np.zeros(self._count), np.zeros(self._count)
-        corners = self._faces.ravel()
-        np.maximum.at(largest, corners, np.repeat(logarithms, 3))
-        np.minimum.at(smallest, corners, np.repeat(logarithms, 3))
-        return np.asarray(np.exp(np.where(largest >= -smallest, largest, smallest)))
+        around = logarithms[self._triangles_around]
+        farthest = np.zeros(self._count)
+        if len(around):
+            largest, smallest = (extreme.reduceat(around, self._starts) for extreme in (np.maximum, np.minimum))
+            farthest[self._with_triangles] = np.where(largest >= -smallest, largest, smallest)
+        return np.asarray(np.exp(farthest))
 
 
-def _average_at_landmarks(prepared: PreparedMap) -> csr_array:
-    """(n, M) weights that average values of the tetrahedra around the first key's vertices."""
-    mesh = prepared.mesh
-    count = len(mesh.tets)
-    weights = np.repeat(mesh.volumes * prepared.insideness, 4)
-    around = coo_array((weights, (mesh.tets.ravel(), np.repeat(np.arange(count), 4))), shape=(len(mesh.points), count))
-    sums = prepared.landmarks @ around.tocsr()
-    return csr_array(diags_array(1.0 / sums.sum(axis=1)) @ sums)
+class _LandmarkAverages:
+    """Averages of the tetrahedra around the first key's vertices: first at the mesh's vertices, then at landmarks."""
+
+    def __init__(self, prepared: PreparedMap) -> None:
+        mesh = prepared.mesh
+        weights = np.repeat(mesh.volumes * prepared.insideness, 4)
+        owners = np.repeat(np.arange(len(mesh.tets)), 4)
+        shape = (len(mesh.points), len(mesh.tets))
+        self._around = coo_array((weights, (mesh.tets.ravel(), owners)), shape=shape).tocsr()
+        totals = prepared.landmarks @ self._around.sum(axis=1)
+        self._landmarks = csr_array(diags_array(1.0 / totals) @ prepared.landmarks)
+
+    def of(self, matrices: Floats) -> Floats:
+        """(n, 3, 3) averages of matrices (M, 3, 3) of the tetrahedra."""
+        return np.asarray((self._landmarks @ (self._around @ matrices.reshape(-1, 9))).reshape(-1, 3, 3))
 
 
 class Excess(NamedTuple):
@@ -149,8 +163,7 @@ def worst_excess(pair: KeyPair, frames: Floats) -> Excess:
 
     ``ratio`` is how far, over the nearer end of that interval: 0 where no edge leaves it.
     """
-    sides = np.sort(pair.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges = np.unique(np.concatenate([sides, pair.edges]), axis=0)
+    edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
     lengths = [np.linalg.norm(key[edges[:, 0]] - key[edges[:, 1]], axis=1) for key in (pair.key0, pair.key1)]
     shortest, longest = np.minimum(*lengths), np.maximum(*lengths)
     usable = shortest > _SHORTEST * pair.diagonal

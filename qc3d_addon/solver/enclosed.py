@@ -99,10 +99,12 @@ class MovingVolumes:
         positions : (3, l)
             Of the used vertices.
         """
-        first, second, third, view = np.stack([coordinate[self._looked_at] for coordinate in positions], axis=1)
+        seen = np.empty((3, *self._looked_at.shape))
+        for axis in range(3):
+            np.take(positions[axis], self._looked_at, out=seen[axis], mode="clip")
+        first, second, third, view = seen.transpose(1, 0, 2)
         normals = cross_product(second - first, third - first)
-        first -= view
-        shares = (first * normals).sum(axis=0)
+        shares = ((first - view) * normals).sum(axis=0)
         volumes = np.bincount(self._label_of_face, weights=shares, minlength=self._components) / 6.0
         return volumes, np.stack([self._incidence @ normal for normal in normals]) / 6.0
 

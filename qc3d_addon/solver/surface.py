@@ -139,7 +139,11 @@ def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
 def cross_product(first: Floats, second: Floats) -> Floats:
     """(3, k) cross products of vectors (3, k), stored by coordinate."""
     (x, y, z), (u, v, w) = first, second
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
+    product = np.empty((3, *x.shape))
+    np.subtract(y * w, z * v, out=product[0])
+    np.subtract(z * u, x * w, out=product[1])
+    np.subtract(x * v, y * u, out=product[2])
+    return product
 
 
 def face_normals(positions: Floats, faces: Ints) -> Floats:

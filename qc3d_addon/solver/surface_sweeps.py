@@ -166,9 +166,12 @@ class Sweeps:
         if len(self._surface.moving):
             iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
             self._move((yield from self._corrected(tangents)))
-            for _ in range(sweeps - 1):
+            for sweep in range(1, sweeps):
                 present = self._moved.copy()
                 refitted = yield from self._refitted()
+                # The first half gets by without volumes.
+                if 2 * sweep > sweeps:
+                    refitted = yield from self._with_volumes(refitted)
                 if np.abs(refitted - present).max() <= _SETTLED:  # else rounding would be amplified
                     break
                 self._move(iteration.next(present, refitted))
@@ -211,7 +214,7 @@ class Sweeps:
         load = _applied(self._spread, tangents.reshape(3, -1)) + self._constant_load
         if len(self._wanted.lengths):
             load += _applied(self._surface.spans.T, self._wanted_spans())[:, self._moving]
-        return (yield from self._with_volumes((yield load)))
+        return np.asarray((yield load))
 
     def _corrected(self, tangents: Floats) -> Solving[Floats]:
         """Positions (3, k) fitted to tangents (3, 2, m), solved for the change.

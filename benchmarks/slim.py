@@ -50,7 +50,7 @@ class Problem:
         self.embedding = Embedding.of(KeyPair.checked(key0, key1, faces))
         self.mesh = fill_cube(self.embedding.key0, faces, Settings(engine="delaunay", quality="fine")).mesh
         self.landmarks = interpolation_matrix(self.mesh, self.embedding.key0)
-        self.targets = list(path_to(SurfacePath(self.embedding), self.embedding.key1))
+        self.targets = path_to(SurfacePath(self.embedding), self.embedding.key1)
 
     def missed(self, values: Floats, target: Floats) -> float:
         """Root mean square distance of landmarks from their targets, in cube units."""

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .foldfree import FoldFreeFitter
+from .parallel import batches
 from .representation import polar_decomposition
 from .rotations import nearest_branch, rotation_vectors
 from .surface_path import SurfacePath
@@ -37,17 +38,17 @@ class FollowedPath:
     turns: Floats
 
 
-def path_to(path: SurfacePath, key1: Floats) -> Iterator[Floats]:
+def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
     """Shapes (n, 3) on the way to the second key, in cube units, evenly spaced in time; the key itself comes last.
 
     Their number follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
     """
     angles = np.degrees(path.turning.angles)
     steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
-    for step in range(1, steps):
-        # The shapes on the way only lead the map; they need not have settled.
-        yield path.positions(step / steps, sweeps=_PATH_SWEEPS)
-    yield key1
+    moments = [(step / steps, None) for step in range(1, steps)]
+    # The shapes on the way only lead the map; they need not have settled.
+    shapes = [shape for few in batches(moments) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]
+    return [*shapes, key1]
 
 
 def follow_path(fitter: FoldFreeFitter, targets: Sequence[Floats]) -> Generator[float, None, FollowedPath]:

@@ -214,14 +214,17 @@ def _projected_blocks(
     corner = terms.mixed * norm * across + terms.curvature * along * across
     bottom = terms.curvature * across**2
     top, corner, bottom = _projected_2x2(terms.linear, top, corner, bottom)
-    # Rows of the factors: gradients contracted with the two directions, (M, 4, 3, 2), then mixed by the 2 x 2 part.
+    # Rows of the factors: gradients contracted with the two directions. A block row of all corners and axes at once
+    # is one small product for each tetrahedron.
     factors = np.stack([gradients @ first.transpose(0, 2, 1), gradients @ second.transpose(0, 2, 1)], axis=3)
+    factors = factors.reshape(-1, 12, 2)
     mixed = volumes[:, None, None] * np.stack([top, corner, corner, bottom], axis=1).reshape(-1, 2, 2)
-    blocks = factors[:, :, None] @ (mixed[:, None] @ factors.transpose(0, 1, 3, 2))[:, None]
+    rows = (factors @ mixed) @ factors.transpose(0, 2, 1)
+    blocks = np.ascontiguousarray(rows.reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4))
     laplacian = (volumes * terms.linear)[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
     for axis in range(3):
         blocks[..., axis, axis] += laplacian
-    return np.asarray(blocks)
+    return blocks
 
 
 def _projected_2x2(

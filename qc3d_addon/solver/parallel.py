@@ -8,6 +8,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -23,6 +24,18 @@ def thread_count() -> int:
     """How many pieces of work run at once: the cores that this process may use, at most four."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(cores, _MOST_THREADS)
+
+
+@contextmanager
+def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
+    """Begin ``work`` in a thread of its own, to go on with something else; after an error it is not waited for."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        yield pool.submit(work)
+    except BaseException:
+        pool.shutdown(wait=False)
+        raise
+    pool.shutdown()
 
 
 def batches(items: Sequence[Item]) -> list[Sequence[Item]]:

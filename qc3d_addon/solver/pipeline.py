@@ -8,6 +8,7 @@ import time as clock
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -29,6 +30,7 @@ from .measures import measure
 from .meshing import fill_cube
 from .natural import NaturalFrames
 from .orientation import require_reachable
+from .parallel import beside
 from .prepared import PreparedMap
 from .report import bake_report
 from .settings import Settings
@@ -120,20 +122,16 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
     yield Progress("mesh", 0.0)
-    with _timed(seconds, "mesh"):
-        filled = fill_cube(embedding.key0, pair.faces, settings)
-    yield Progress("mesh", 1.0)
-    yield Progress("locate", 0.0)
-    with _timed(seconds, "locate"):
-        landmarks = interpolation_matrix(filled.mesh, embedding.key0)
-    yield Progress("locate", 1.0)
-    yield Progress("fit", 0.0)
-    with _timed(seconds, "path"):
-        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
-        targets = []
-        for target in path_to(path, embedding.key1):
-            targets.append(target)
-            yield Progress("fit", 0.0)
+    with beside(partial(_way, embedding, settings, seconds)) as way:
+        with _timed(seconds, "mesh"):
+            filled = fill_cube(embedding.key0, pair.faces, settings)
+        yield Progress("mesh", 1.0)
+        yield Progress("locate", 0.0)
+        with _timed(seconds, "locate"):
+            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
+        yield Progress("locate", 1.0)
+        yield Progress("fit", 0.0)
+        path, targets = way.result()
     with _timed(seconds, "fit"):
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
         followed = yield from _staged("fit", follow_path(fitter, targets))
@@ -164,6 +162,13 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     else:
         return prepared
     return replace(prepared, notes=(*filled.notes, note))
+
+
+def _way(embedding: Embedding, settings: Settings, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
+    """The surface's own path to the second key, and the shapes on it that lead the map."""
+    with _timed(seconds, "path"):
+        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
+        return path, path_to(path, embedding.key1)
 
 
 def _closed_parts(count: int) -> str:

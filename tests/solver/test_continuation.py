@@ -26,7 +26,7 @@ def followed(key1: Floats) -> tuple[Embedding, FoldFreeFitter, FollowedPath, lis
     mesh = jittered_grid(8, seed=1)
     fitter = FoldFreeFitter(mesh, interpolation_matrix(mesh, embedding.key0), embedding.weights)
     path = SurfacePath(embedding)
-    steps = follow_path(fitter, list(path_to(path, embedding.key1)))
+    steps = follow_path(fitter, path_to(path, embedding.key1))
     done: list[float] = []
     while True:
         try:

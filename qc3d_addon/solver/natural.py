@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from .branches import Turning, swing_beside
 from .colliders import Guard
 from .frame import Frame
-from .parallel import batches, in_threads
+from .parallel import batches, beside, in_threads
 from .prepared import PreparedMap
 from .rates import Rates, hermite
 from .spins import ExtraSpins
@@ -50,9 +50,10 @@ class NaturalFrames:
         self._spins = ExtraSpins(embedding, self._surface, prepared.extra_turns)
         if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
-        turning = _turning_inside(prepared, self._surface)
-        self._volume = VolumePath(mesh, prepared.maps, turning, prepared.insideness, law)
-        self._limit = CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1, self.still)
+        with beside(lambda: CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1, self.still)) as limit:
+            turning = _turning_inside(prepared, self._surface)
+            self._volume = VolumePath(mesh, prepared.maps, turning, prepared.insideness, law)
+        self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
             key - prepared.landmarks @ self._volume.at(time)

@@ -18,6 +18,7 @@ from .rotations import determinants
 from .stretch import StretchLaw
 from .surface_path import SurfacePath
 from .tetmesh import Floats, TetMesh
+from .unfolding import covered
 from .winding import insideness, winding_numbers
 
 _REPAIR_ITERATIONS = 15
@@ -98,9 +99,15 @@ class PreparedMap:
         return int((determinants(self.mesh.jacobians(values)) <= 0.0).sum())
 
     def unfolded(self, values: Floats, time: float) -> Floats:
-        """A map without folds with nearly the landmarks of the map ``values`` (N, 3), from the nearest on the way."""
+        """A map without folds near the map ``values`` (N, 3), by means of the nearest on the way.
+
+        That covers the folds; where it cannot, it is drawn to the landmarks of ``values``.
+        """
         nearest = self.maps[round(time * (len(self.maps) - 1))]
-        return self.fitter.fit(nearest, self.landmarks @ values, _REPAIR_ITERATIONS)
+        found = covered(self.mesh, values, nearest)
+        if found is None:
+            found = self.fitter.fit(nearest, self.landmarks @ values, _REPAIR_ITERATIONS)
+        return found
 
     def landmark_residual(self) -> dict[str, float]:
         """Distance of the mapped landmarks from the second key: ``rms`` and ``max``, over the bounding-box diagonal."""

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
 
 from .branches import Turning
 from .factorization import dissection_order, factored
@@ -17,7 +18,7 @@ from .representation import polar_decomposition
 from .rotations import products
 from .stiffness import StiffnessPattern, stiffness_elements
 from .stretch import Stretch, StretchLaw
-from .tetmesh import Floats, TetMesh
+from .tetmesh import Floats, Ints, TetMesh
 
 
 class VolumePath:
@@ -47,15 +48,16 @@ class VolumePath:
         self._weights = mesh.volumes * insideness
         elements = stiffness_elements(self._weights, mesh.gradients)
         matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(elements)
-        held = mesh.on_cube_face
         order = dissection_order(mesh.points, matrix)
-        self._systems = []
-        for coordinate in range(3):
-            resting = np.flatnonzero(held[:, coordinate])
-            free = order[~held[order, coordinate]]
+
+        def system(coordinate: int) -> tuple[Ints, SuperLU, Floats]:
+            held = mesh.on_cube_face[:, coordinate]
+            free, resting = order[~held[order]], np.flatnonzero(held)
             rows = matrix[free]
-            held_load = rows[:, resting] @ mesh.points[resting, coordinate]
-            self._systems.append((free, factored(csr_array(rows[:, free])), held_load))
+            return free, factored(csr_array(rows[:, free])), rows[:, resting] @ mesh.points[resting, coordinate]
+
+        # For each coordinate the vertices that are free to move along it, the factors, and the load of the others.
+        self._systems = list(in_threads(system, range(3)))
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""

@@ -1,59 +1,47 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From two keys to frames: prepare, fit, interpolate, as generators that report progress and can be dropped."""
+"""From prepared keys to frames, as generators that report progress and can be dropped."""
 
 from __future__ import annotations
 
-import time as clock
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chain import join
 from .colliders import Collider, Guard, Obstacle
-from .continuation import follow_path, path_to
 from .easing import eased
-from .embedding import Embedding
 from .errors import InputError
-from .foldfree import FoldFreeFitter
 from .frame import Frame
 from .keypair import KeyPair
 from .linear import LinearFrames
-from .location import interpolation_matrix
 from .measures import measure
-from .meshing import fill_cube
 from .natural import NaturalFrames
-from .orientation import require_reachable
-from .parallel import beside
+from .preparation import prepare
 from .prepared import PreparedMap
+from .progress import STAGES, Progress, Steps, finish, staged, timed
 from .report import bake_report
 from .settings import Settings
-from .surface_path import SurfacePath
 from .tetmesh import Floats, Ints
 
-T = TypeVar("T")
-
-# Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
-_LARGE_RESIDUAL = 0.03
-
-
-STAGES = ("mesh", "locate", "fit", "factor", "frames")
-
-
-class Progress(NamedTuple):
-    """Where the work is: the stage's name, one of ``STAGES``, and how much of that stage is done, 0..1."""
-
-    stage: str
-    fraction: float
-
-
-Steps = Generator[Progress, None, T]
+__all__ = [
+    "STAGES",
+    "Bake",
+    "Progress",
+    "Steps",
+    "chain_inbetweens",
+    "checked_times",
+    "evenly_spaced",
+    "finish",
+    "inbetweens",
+    "prepare",
+    "require_chain",
+    "split",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,18 +66,6 @@ class Bake:
     measures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
-def finish(steps: Steps[T], on_progress: Callable[[Progress], None] | None = None) -> T:
-    """Run steps to their end and return what they return."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            result: T = stop.value
-            return result
-        if on_progress is not None:
-            on_progress(progress)
-
-
 def evenly_spaced(count: int) -> Floats:
     """(count + 2,) times of ``count`` in-betweens between the keys at 0 and 1.
 
@@ -101,78 +77,6 @@ def evenly_spaced(count: int) -> Floats:
     if count < 0:
         raise InputError(f"The number of in-betweens is {count}; it must be 0 or more.")
     return np.linspace(0.0, 1.0, count + 2)
-
-
-def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
-    """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
-
-    Raises
-    ------
-    InputError
-        If the second key is the first one mirrored or turned inside out, which no map without folds reaches.
-    MeshingError
-        If the engine asked for cannot fill the cube.
-
-    Notes
-    -----
-    Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
-    both keys all the same.
-    """
-    require_reachable(pair)
-    seconds: dict[str, float] = {}
-    embedding = Embedding.of(pair)
-    yield Progress("mesh", 0.0)
-    with beside(partial(_way, embedding, settings, seconds)) as way:
-        with _timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, pair.faces, settings)
-        yield Progress("mesh", 1.0)
-        yield Progress("locate", 0.0)
-        with _timed(seconds, "locate"):
-            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
-        yield Progress("locate", 1.0)
-        yield Progress("fit", 0.0)
-        path, targets = way.result()
-    with _timed(seconds, "fit"):
-        fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        followed = yield from _staged("fit", follow_path(fitter, targets))
-    yield Progress("fit", 1.0)
-    prepared = PreparedMap(
-        pair,
-        filled.mesh,
-        followed.maps,
-        followed.turns,
-        settings.extra_turns,
-        filled.engine,
-        settings.quality,
-        filled.notes,
-        seconds,
-        {settings.stretch: path},
-    )
-    missed = prepared.landmark_residual()["rms"]
-    if path.inside_out:
-        note = (
-            f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
-            "does that, and the mode straight may look no worse."
-        )
-    elif missed > _LARGE_RESIDUAL:
-        note = (
-            f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
-            "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
-        )
-    else:
-        return prepared
-    return replace(prepared, notes=(*filled.notes, note))
-
-
-def _way(embedding: Embedding, settings: Settings, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
-    """The surface's own path to the second key, and the shapes on it that lead the map."""
-    with _timed(seconds, "path"):
-        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
-        return path, path_to(path, embedding.key1)
-
-
-def _closed_parts(count: int) -> str:
-    return "A closed part of the mesh is" if count == 1 else f"{count} closed parts of the mesh are"
 
 
 def inbetweens(prepared: PreparedMap, times: ArrayLike, settings: Settings) -> Steps[Bake]:
@@ -212,22 +116,22 @@ def chain_inbetweens(
     seconds = _summed(part.seconds for part in prepared)
     obstacle = None
     if collider is not None:
-        with _timed(seconds, "colliders"):
+        with timed(seconds, "colliders"):
             obstacle = yield from _followed(collider, wanted, settings)
     segments, local = split(eased(wanted, settings.easing), len(prepared))
     yield Progress("factor", 0.0)
-    with _timed(seconds, "factor"):
-        makers = yield from _staged("factor", _makers(prepared, settings))
+    with timed(seconds, "factor"):
+        makers = yield from staged("factor", _makers(prepared, settings))
     yield Progress("factor", 1.0)
     frames = np.empty((len(wanted), *prepared[0].pair.key0.shape))
     made: dict[int, Frame] = {}
     key_error = 0.0
-    with _timed(seconds, "frames"):
+    with timed(seconds, "frames"):
         for number, maker in enumerate(makers):
             members = np.flatnonzero(segments == number)
             share = (number, len(makers))
             guard = None if obstacle is None else Guard(obstacle, prepared[number].pair, number, members)
-            produced = yield from _staged("frames", maker.frames(local[members], guard), share)
+            produced = yield from staged("frames", maker.frames(local[members], guard), share)
             made.update(zip(members.tolist(), produced, strict=True))
             for index, frame in zip(members, produced, strict=True):
                 frames[index] = frame.positions
@@ -235,7 +139,7 @@ def chain_inbetweens(
             key_error = max(key_error, error / prepared[number].pair.diagonal)
     yield Progress("frames", 1.0)
     ordered = [made[index] for index in range(len(wanted))]
-    with _timed(seconds, "measure"):
+    with timed(seconds, "measure"):
         measures, worst = measure(prepared, segments, frames, [frame.values for frame in ordered])
     notes = [note for part in prepared for note in part.notes] + [note for maker in makers for note in maker.notes]
     report = bake_report(prepared, settings, wanted, ordered, notes)
@@ -321,21 +225,3 @@ def _replace_by_keys(frames: Floats, members: Ints, times: Floats, pair: KeyPair
             error = max(error, float(np.abs(frames[index] - key).max()))
             frames[index] = key
     return error
-
-
-def _staged(stage: str, work: Generator[float, None, T], share: tuple[int, int] = (0, 1)) -> Steps[T]:
-    """Name the progress of a piece of work, which is the part ``share`` = (number, of so many) of its stage."""
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as stop:
-            result: T = stop.value
-            return result
-        yield Progress(stage, (share[0] + done) / share[1])
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    started = clock.perf_counter()
-    yield
-    seconds[stage] = clock.perf_counter() - started

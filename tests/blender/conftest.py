@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installe
 
 import qc3d_addon  # noqa: E402
 from qc3d_addon.blender import records, slider  # noqa: E402
-from qc3d_addon.solver import pipeline  # noqa: E402
+from qc3d_addon.solver import pipeline, preparation  # noqa: E402
 from qc3d_addon.solver.meshing import FilledCube  # noqa: E402
 from qc3d_addon.solver.pipeline import Progress  # noqa: E402
 from qc3d_addon.solver.settings import Settings  # noqa: E402
@@ -51,7 +51,7 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
         tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
         return FilledCube(TetMesh(corners, tets), "six", ())
 
-    monkeypatch.setattr(pipeline, "fill_cube", fill_cube)
+    monkeypatch.setattr(preparation, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
 

@@ -17,7 +17,9 @@ import tempfile
 import time as clock
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -25,9 +27,12 @@ from . import stage_cases
 from .catalogue import Floats, Ints
 
 if TYPE_CHECKING:
-    from qc3d_addon.solver.natural import NaturalFrames
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import SuperLU
 
-_REPEATS = 5
+    from qc3d_addon.solver.prepared import PreparedMap
+
+_REPEATS = 15
 
 
 def main(arguments: list[str]) -> None:
@@ -44,7 +49,6 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     """Seconds of each stage of a cold bake, of a warm one and of a second one, and the floor of a frame."""
     started = clock.perf_counter()
     from qc3d_addon.solver.keypair import KeyPair
-    from qc3d_addon.solver.natural import NaturalFrames
     from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
     from qc3d_addon.solver.settings import Settings
 
@@ -58,8 +62,6 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     cold = clock.perf_counter() - started
     seconds: dict[str, float] = dict(bake.report["seconds"])
     warm = _fastest(lambda: finish(inbetweens(prepared, evenly_spaced(count), settings)), 2)
-    maker = NaturalFrames(prepared)
-    one = _fastest(lambda: list(maker.frames(np.array([0.4]))), _REPEATS)
     found = {
         "vertices": len(key0),
         "tetrahedra": len(prepared.mesh.tets),
@@ -67,9 +69,8 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
         "import": imported,
         "cold": cold,
         "warm": warm,
-        "one": one,
         **{f"stage_{name}": value for name, value in seconds.items()},
-        **{f"floor_{name}": value for name, value in _floors(maker).items()},
+        **_one_frame(prepared),
         "count": count,
     }
     with suppress(ImportError):  # without Blender's module there is nothing to write to
@@ -77,21 +78,54 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
     return found
 
 
-def _floors(maker: NaturalFrames) -> dict[str, float]:
-    """Seconds of the back-substitutions of one frame: one of each system, and as many as its sweeps make."""
-    from qc3d_addon.solver.surface_path import SWEEPS
+def _one_frame(prepared: PreparedMap) -> dict[str, float]:
+    """Seconds of one frame, of the back-substitutions in it, and of the same ones by themselves, over and over."""
+    from qc3d_addon.solver import surface_sweeps, volume_path
+    from qc3d_addon.solver.factorization import factored
+    from qc3d_addon.solver.natural import NaturalFrames
 
-    surface, systems = maker._surface._surface, maker._volume._systems
-    loads = np.ones((3, len(surface.moving)))
+    watches: list[_Stopwatch] = []
 
-    def volume() -> None:
-        for free, factors, _ in systems:
-            factors.solve(np.ones(len(free)))
+    def watched(matrix: csr_array) -> _Stopwatch:
+        watches.append(_Stopwatch(factored(matrix)))
+        return watches[-1]
 
-    of_volume, of_surface = _fastest(volume, _REPEATS), _fastest(lambda: surface.solve(loads), _REPEATS)
-    # The sweeps, the last correction, and the direction that restores volumes.
-    swept = SWEEPS + (1 if surface.volumes.empty else 2)
-    return {"one_of_each": of_volume + of_surface, "with_sweeps": of_volume + swept * of_surface}
+    with patch.object(volume_path, "factored", watched), patch.object(surface_sweeps, "factored", watched):
+        maker = NaturalFrames(replace(prepared, paths={}))
+    middle = np.array([0.4])
+    list(maker.frames(middle))  # what is made on first use
+    runs = []
+    for _ in range(_REPEATS):
+        for watch in watches:
+            watch.clear()
+        started = clock.perf_counter()
+        list(maker.frames(middle))
+        runs.append((clock.perf_counter() - started, sum(watch.seconds for watch in watches)))
+    one, within = min(runs)
+    return {"one": one, "floor": within, "floor_alone": sum(_fastest(watch.again, _REPEATS) for watch in watches)}
+
+
+class _Stopwatch:
+    """Factors that count the seconds of their back-substitutions."""
+
+    def __init__(self, factors: SuperLU) -> None:
+        self._factors = factors
+        self.clear()
+
+    def clear(self) -> None:
+        self.seconds = 0.0
+        self._loads: list[Floats] = []
+
+    def solve(self, load: Floats) -> Floats:
+        started = clock.perf_counter()
+        solution: Floats = self._factors.solve(load)
+        self.seconds += clock.perf_counter() - started
+        self._loads.append(load)
+        return solution
+
+    def again(self) -> None:
+        for load in self._loads:
+            self._factors.solve(load)
 
 
 def _written(faces: Ints, frames: Floats) -> float:

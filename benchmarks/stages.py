@@ -74,12 +74,12 @@ def pairs(chosen: argparse.Namespace) -> str:
                 cells += [f"{yardstick:.0f}", f"{share:.2f} (limit {limit})"]
             else:
                 cells += ["", ""]
-            cells += [f"{found['warm']:.2f}", _times(found["warm"], found["count"] * found["floor_with_sweeps"])]
-            cells += [f"{1e3 * found['one']:.0f}", _times(found["one"], found["floor_with_sweeps"])]
-            cells += [f"{1e3 * found['floor_one_of_each']:.1f}", f"{found['peak_mb']:.0f}", str(found["folds"])]
+            cells += [f"{found['warm']:.2f}", _times(found["warm"], found["count"] * found["floor"])]
+            cells += [f"{1e3 * found['one']:.0f}", f"{1e3 * found['floor']:.0f}", _times(found["one"], found["floor"])]
+            cells += [f"{1e3 * found['floor_alone']:.0f}", f"{found['peak_mb']:.0f}", str(found["folds"])]
             rows.append(cells)
-    head = ["pair", "engine", *STAGES, "cold", "Y", "cold / Y", "warm", "/ floors", "one, ms", "/ floor"]
-    return table([*head, "one of each, ms", "MB", "folds"], rows)
+    head = ["pair", "engine", *STAGES, "cold", "Y", "cold / Y", "warm", "/ floors"]
+    return table([*head, "one, ms", "floor, ms", "/ floor", "alone, ms", "MB", "folds"], rows)
 
 
 def growth(frames: int) -> str:

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from .errors import MeshingError
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,6 +94,9 @@ class TetMesh:
     @cached_property
     def gradient_operator(self) -> csr_array:
         """(3M, N): takes a coordinate of a map (N,) to its derivatives along x on all tetrahedra, then y, then z."""
+        # The types of this module are wanted where scipy must not be loaded yet.
+        from scipy.sparse import csr_array
+
         starts = np.arange(0, 12 * len(self.tets) + 1, 4)
         columns = np.concatenate([self.tets] * 3).ravel()
         return csr_array(

@@ -48,7 +48,7 @@ class Problem:
     def __init__(self, case: str) -> None:
         faces, key0, key1 = load(case)
         self.embedding = Embedding.of(KeyPair.checked(key0, key1, faces))
-        self.mesh = fill_cube(self.embedding.key0, faces, Settings(engine="delaunay", quality="fine")).mesh
+        self.mesh = fill_cube(self.embedding.key0, faces, Settings(engine="delaunay", quality="finest")).mesh
         self.landmarks = interpolation_matrix(self.mesh, self.embedding.key0)
         self.targets = path_to(SurfacePath(self.embedding), self.embedding.key1)
 

@@ -107,13 +107,13 @@ def test_tables_are_written_between_the_markers(tmp_path: Path) -> None:
 
 
 def test_results_of_other_sources_are_not_reused(tmp_path: Path) -> None:
-    results = Results(tmp_path, 3, "delaunay", "draft")
+    results = Results(tmp_path, 3, "delaunay", "normal")
     assert results.load(LISTED, "natural") is None
     results.store(LISTED, "natural", {"worst": {}})
     found = results.load(LISTED, "natural")
     assert found is not None
     assert found["worst"] == {}
-    assert Results(tmp_path, 3, "delaunay", "normal").load(LISTED, "natural") is None
+    assert Results(tmp_path, 3, "delaunay", "fine").load(LISTED, "natural") is None
     for path in tmp_path.glob("*.json"):
         path.write_text(json.dumps(found | {"fingerprint": "other"}), encoding="utf-8")
     assert results.load(LISTED, "natural") is None
@@ -122,7 +122,7 @@ def test_results_of_other_sources_are_not_reused(tmp_path: Path) -> None:
 
 def test_every_method_runs_on_a_small_pair(bar: dict[str, np.ndarray]) -> None:
     times = np.array([0.0, 0.5, 1.0])
-    contest = Contest(bar["faces"], bar["V0"], bar["V1"], times, {"engine": "delaunay", "quality": "draft"})
+    contest = Contest(bar["faces"], bar["V0"], bar["V1"], times, {"engine": "delaunay", "quality": "normal"})
     for method in ("straight", "poisson", "arap", "natural"):
         outcome = contest.run(method)
         assert outcome.frames.shape == (3, *bar["V0"].shape)

@@ -71,7 +71,7 @@ def test_a_second_file_as_the_target(blob: TetFile, tmp_path: Path) -> None:
 
 def test_two_keys(keys: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    command = ["analyze", str(keys), "--from", "small", "--to", "long", "--engine", "delaunay", "--quality", "draft"]
+    command = ["analyze", str(keys), "--from", "small", "--to", "long", "--engine", "delaunay", "--quality", "normal"]
     assert cli.main([*command, "--output", str(folder)]) == 0
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["folds"] == 0

@@ -13,7 +13,7 @@ import pytest
 
 from qc3d_addon import cli
 
-QUICK = ["--quality", "draft", "--engine", "delaunay"]
+QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def bake(file: Path, *more: str) -> int:

@@ -31,7 +31,7 @@ def _few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def mesh() -> TetMesh:
-    return fill_cube(*shapes._ball(6), Settings(engine="delaunay", quality="draft")).mesh
+    return fill_cube(*shapes._ball(6), Settings(engine="delaunay", quality="normal")).mesh
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def test_frames_of_a_chain(tmp_path: Path) -> None:
     np.savez(tmp_path / "shapes.npz", faces=faces, shape_names=shape_names, V0=points, V1=egg, V2=bean)
     frames, file, report, output = (tmp_path / name for name in ("frames.npz", "chain.qc3d", "r.json", "restored.npz"))
     keys = ["--from", "ball", "--via", "egg", "--to", "bean", "--frames", "2"]
-    settings = ["--quality", "draft", "--engine", "delaunay"]
+    settings = ["--quality", "normal", "--engine", "delaunay"]
     assert cli.main(["interpolate", str(tmp_path / "shapes.npz"), *keys, *settings, "--output", str(frames)]) == 0
     arguments = ["--error", "1e-3", "--output", str(file), "--report", str(report)]
     assert cli.main(["compress", str(frames), *arguments]) == 0

@@ -19,7 +19,7 @@ from qc3d_addon.solver import array_files
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.settings import Settings
 
-QUICK = ["--quality", "draft", "--engine", "delaunay"]
+QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def interpolate(pair: Path, output: Path, *more: str, first: str = "straight", second: str = "bent") -> int:
@@ -124,7 +124,7 @@ def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkey
             easing="ease-in",
             extra_turns=-2,
             engine="delaunay",
-            quality="draft",
+            quality="normal",
             seed=5,
         )
         raise Reached

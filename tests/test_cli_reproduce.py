@@ -22,7 +22,7 @@ from qc3d_addon.solver.regular_grid import kuhn_grid
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarse volumes and few modes."""
-    monkeypatch.setattr(shapes, "SETTINGS", shapes.Settings(engine="delaunay", quality="draft"))
+    monkeypatch.setattr(shapes, "SETTINGS", shapes.Settings(engine="delaunay", quality="normal"))
     monkeypatch.setattr(spectra, "_MODES", 60)
     monkeypatch.setattr(spectra, "_FITTED_COUNTS", (4, 16))
     monkeypatch.setattr(compression, "_FIRST_ITERATIONS", 5)

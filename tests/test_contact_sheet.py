@@ -82,7 +82,7 @@ def test_a_sheet_of_a_baked_scene(through: list[str], bar_scene: Path, tmp_path:
     baked, sheet = tmp_path / "baked.blend", tmp_path / "sheet.png"
     keys = ["--object", "Bar", "--from", through[0], "--to", through[-1]]
     keys += [option for name in through[1:-1] for option in ("--via", name)]
-    quick = ["--frames", "1", "--mode", "linear", "--quality", "draft", "--engine", "delaunay"]
+    quick = ["--frames", "1", "--mode", "linear", "--quality", "normal", "--engine", "delaunay"]
     assert cli.main(["bake", str(bar_scene), *keys, *quick, "--output", str(baked)]) == 0
     contact_sheet.main([str(baked), *keys, "--height", "60", "--view", "front", "--output", str(sheet)])
 

@@ -59,7 +59,7 @@ else:
 from qc3d_addon.start import main
 sys.exit(main())
 """
-QUICK = ["--quality", "draft", "--engine", "delaunay"]
+QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def interrupted(stage: str, arguments: list[str], folder: Path, number: int = signal.SIGINT) -> None:

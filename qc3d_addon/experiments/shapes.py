@@ -19,7 +19,7 @@ from ..solver.rotations import rotation_matrices
 from ..solver.settings import Settings
 from ..solver.tetmesh import Floats, Ints, TetMesh
 
-SETTINGS = Settings(engine="delaunay")
+SETTINGS = Settings(engine="delaunay", quality="fine")
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 

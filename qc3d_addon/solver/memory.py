@@ -11,7 +11,7 @@ from .errors import InputError
 from .settings import Quality
 
 # Measured by benchmarks/large.py, with a margin; docs/limits.md has the figures.
-_MB_OF_QUALITY: dict[Quality, float] = {"draft": 120.0, "normal": 160.0, "fine": 300.0}
+_MB_OF_QUALITY: dict[Quality, float] = {"normal": 120.0, "fine": 160.0, "finest": 300.0}
 _KB_PER_VERTEX = 6.5  # of every pair: the surface's factors and the frames that are worked on at once
 _BYTES_PER_POSITION = 200.0  # of every vertex in every frame: positions, measures, and what makes them
 _SHARE_OF_MACHINE = 0.75
@@ -31,7 +31,7 @@ def estimated_mb(vertices: int, pairs: int, frames: int, quality: Quality, needs
     """
     positions = vertices * frames * _BYTES_PER_POSITION / 1e6
     if not needs_maps:
-        return positions + _MB_OF_QUALITY["draft"]
+        return positions + _MB_OF_QUALITY["normal"]
     return positions + pairs * (_MB_OF_QUALITY[quality] + vertices * _KB_PER_VERTEX / 1e3)
 
 

@@ -53,9 +53,9 @@ class Resolution:
 
 
 RESOLUTIONS: dict[Quality, Resolution] = {
-    "draft": Resolution(spacing=0.03, slope=0.3, largest=0.12),
-    "normal": Resolution(spacing=0.02, slope=0.25, largest=0.1),
-    "fine": Resolution(spacing=0.014, slope=0.25, largest=0.08),
+    "normal": Resolution(spacing=0.03, slope=0.3, largest=0.12),
+    "fine": Resolution(spacing=0.02, slope=0.25, largest=0.1),
+    "finest": Resolution(spacing=0.014, slope=0.25, largest=0.08),
 }
 
 

@@ -13,7 +13,7 @@ from .stretch import StretchLaw
 
 Mode = Literal["natural", "linear", "straight"]
 Engine = Literal["auto", "tetwild", "delaunay"]
-Quality = Literal["draft", "normal", "fine"]
+Quality = Literal["normal", "fine", "finest"]
 
 
 # What a prepared map depends on; the other choices are about frames.
@@ -40,7 +40,7 @@ class Settings:
     engine
         What fills the cube: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
     quality
-        How fine the volume is: ``draft``, ``normal`` or ``fine``.
+        How fine the volume is: ``normal``, ``fine`` or ``finest``.
     seed
         Seed of the random samples of the ``delaunay`` engine.
     mesh_time_limit

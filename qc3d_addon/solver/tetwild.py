@@ -47,7 +47,7 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
     if not len(triangles):
         raise MeshingError("The meshing engine tetwild needs triangles, and the mesh has none that it could use.")
     rng = np.random.default_rng(seed)
-    coarse = RESOLUTIONS["draft"]
+    coarse = RESOLUTIONS["normal"]
     surface = sample_surface(points, faces, coarse.spacing, rng)
     samples = sample_cube(surface, coarse.around(surface), rng)
     background = TetMesh(samples, triangulate(samples))

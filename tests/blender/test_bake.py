@@ -34,7 +34,7 @@ def displayed(basis: np.ndarray, key: np.ndarray) -> np.ndarray:
 def test_the_real_solver_bakes_between_two_keys(
     figure: bpy.types.Object, shapes: ReadShapes, shown: Shown, mode: str
 ) -> None:
-    bake(quality='draft', engine='delaunay', mode=mode)
+    bake(quality='normal', engine='delaunay', mode=mode)
     got = shapes(figure)
     assert [name for name in got if "→" in name] == NAMES
     assert np.array_equal(got["Basis→Lean 4/4"], got["Lean"])
@@ -258,12 +258,12 @@ class TestSlider:
 @pytest.mark.usefixtures("quick_map")
 def test_what_the_caller_leaves_out_comes_from_the_panel(figure: bpy.types.Object, quick_map: list[Any]) -> None:
     figure.qc3d.from_key, figure.qc3d.to_key = "Lean", "Stretch"
-    figure.qc3d.count, figure.qc3d.quality, figure.qc3d.engine = 2, 'fine', 'delaunay'
+    figure.qc3d.count, figure.qc3d.quality, figure.qc3d.engine = 2, 'finest', 'delaunay'
     assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
     assert "Lean→Stretch 1/3" in figure.data.shape_keys.key_blocks
-    bpy.ops.qc3d.bake_inbetweens(count=1, quality='draft')
+    bpy.ops.qc3d.bake_inbetweens(count=1, quality='normal')
     assert "Lean→Stretch 1/2" in figure.data.shape_keys.key_blocks
-    assert [(call.quality, call.engine) for call in quick_map] == [('fine', 'delaunay'), ('draft', 'delaunay')]
+    assert [(call.quality, call.engine) for call in quick_map] == [('finest', 'delaunay'), ('normal', 'delaunay')]
 
 
 @pytest.mark.usefixtures("quick_map")

@@ -44,7 +44,7 @@ def displayed(basis: np.ndarray, key: np.ndarray) -> np.ndarray:
 def test_the_real_solver_meets_every_key_without_a_corner_at_the_inner_one(
     figure: bpy.types.Object, shapes: ReadShapes, shown: Shown
 ) -> None:
-    choices = {"mode": 'natural', "quality": 'draft', "engine": 'delaunay', "count": 3}
+    choices = {"mode": 'natural', "quality": 'normal', "engine": 'delaunay', "count": 3}
     bake(**choices)
     got = shapes(figure)
     assert made(got) == [f"{CHAIN} {step}/8" for step in range(1, 9)]
@@ -205,7 +205,7 @@ class TestPanel:
         assert "Basis→Stretch" in figure
 
     def test_every_setting_reaches_the_solver(self, figure: bpy.types.Object, quick_map: list[Settings]) -> None:
-        chosen = Settings("linear", "logarithmic", "ease-out", 2, "delaunay", "fine", 7)
+        chosen = Settings("linear", "logarithmic", "ease-out", 2, "delaunay", "finest", 7)
         names = ("mode", "stretch", "easing", "extra_turns", "engine", "quality", "seed")
         for name in names:
             setattr(figure.qc3d, name, getattr(chosen, name))

@@ -21,7 +21,7 @@ from qc3d_addon.worker import client
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals as Linux and macOS do")
 
 State = Callable[[], dict[str, Any]]
-CHOICES = {"from_key": "Basis", "to_key": "Lean", "count": 2, "quality": 'draft', "engine": 'delaunay'}
+CHOICES = {"from_key": "Basis", "to_key": "Lean", "count": 2, "quality": 'normal', "engine": 'delaunay'}
 
 
 @pytest.fixture

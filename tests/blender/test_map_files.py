@@ -27,7 +27,7 @@ def saved(figure: bpy.types.Object, quick_map: list[Settings], tmp_path: Path) -
     """The maps of a chain, saved; then the file from before the bake again."""
     blend, path = tmp_path / "before.blend", tmp_path / "figure.qc3dmap"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    bake(from_key="Basis", via=[{"name": "Lean"}], to_key="Stretch", quality="fine", engine="delaunay", seed=3)
+    bake(from_key="Basis", via=[{"name": "Lean"}], to_key="Stretch", quality="finest", engine="delaunay", seed=3)
     assert bpy.ops.qc3d.save_map(filepath=str(path.with_suffix(""))) == {"FINISHED"}
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     quick_map.clear()
@@ -40,12 +40,12 @@ def test_loaded_maps_are_used(saved: Path, quick_map: list[Settings]) -> None:
     assert bpy.ops.qc3d.load_map(filepath=str(saved)) == {"FINISHED"}
     panel = obj.qc3d
     assert (panel.from_key, [inner.name for inner in panel.via], panel.to_key) == ("Basis", ["Lean"], "Stretch")
-    assert (panel.quality, panel.engine, panel.seed) == ("fine", "delaunay", 3)
+    assert (panel.quality, panel.engine, panel.seed) == ("finest", "delaunay", 3)
     bake()
     assert not quick_map  # nothing was meshed
-    bake(from_key="Basis", to_key="Lean", quality="fine", engine="delaunay", seed=3)
+    bake(from_key="Basis", to_key="Lean", quality="finest", engine="delaunay", seed=3)
     assert not quick_map
-    bake(from_key="Basis", to_key="Lean", quality="draft")
+    bake(from_key="Basis", to_key="Lean", quality="normal")
     assert len(quick_map) == 1
 
 
@@ -53,7 +53,7 @@ def test_the_frames_are_those_of_the_bake(
     saved: Path, shapes: Callable[[bpy.types.Object], dict[str, np.ndarray]]
 ) -> None:
     obj = bpy.context.active_object
-    bake(from_key="Basis", via=[{"name": "Lean"}], to_key="Stretch", quality="fine", engine="delaunay", seed=3)
+    bake(from_key="Basis", via=[{"name": "Lean"}], to_key="Stretch", quality="finest", engine="delaunay", seed=3)
     made = shapes(obj)
     bpy.ops.qc3d.remove()
     assert bpy.ops.qc3d.load_map(filepath=str(saved)) == {"FINISHED"}

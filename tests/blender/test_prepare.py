@@ -35,7 +35,7 @@ def test_a_real_map_survives_saving_and_loading(
 ) -> None:
     from qc3d_addon.solver import task
 
-    real = {"quality": 'draft', "engine": 'delaunay'}
+    real = {"quality": 'normal', "engine": 'delaunay'}
     assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}
     kept = map_properties()
     reload(tmp_path)
@@ -71,8 +71,8 @@ def test_a_sculpted_key_asks_for_a_new_map(figure: bpy.types.Object, quick_map: 
 
 
 def test_other_settings_ask_for_a_new_map(figure: bpy.types.Object, quick_map: list[Any]) -> None:
-    fine = {"quality": 'fine', "engine": 'auto'}
-    for choices in ({}, {"quality": 'fine'}, fine, fine):
+    fine = {"quality": 'finest', "engine": 'auto'}
+    for choices in ({}, {"quality": 'finest'}, fine, fine):
         bake(**choices)
     assert len(quick_map) == 3
 

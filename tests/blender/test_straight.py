@@ -16,7 +16,7 @@ from qc3d_addon.blender import kept_measures
 from qc3d_addon.blender.records import Record
 
 Shapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
-CHOICES = {"from_key": "Basis", "to_key": "Mirrored", "count": 3, "engine": 'delaunay', "quality": 'draft'}
+CHOICES = {"from_key": "Basis", "to_key": "Mirrored", "count": 3, "engine": 'delaunay', "quality": 'normal'}
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ def bar() -> bpy.types.Object:
 def bake(tolerance: float) -> None:
     found = bpy.ops.qc3d.bake_inbetweens(
         from_key="Basis", to_key="Bent", use_tolerance=True, tolerance=tolerance, engine='delaunay',
-        quality='draft',
+        quality='normal',
     )  # fmt: skip
     assert found == {"FINISHED"}
 
@@ -71,7 +71,7 @@ def test_smaller_tolerances_need_more_and_both_are_kept(bar: bpy.types.Object, s
     coarse = shapes(bar)
     # What the fine bake shows is near what one of all steps shows.
     bpy.ops.qc3d.bake_inbetweens(
-        from_key="Basis", to_key="Bent", count=DENSE_STEPS - 1, engine="delaunay", quality="draft"
+        from_key="Basis", to_key="Bent", count=DENSE_STEPS - 1, engine="delaunay", quality="normal"
     )
     dense = shapes(bar)
     stride = DENSE_STEPS // counts[2]

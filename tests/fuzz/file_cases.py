@@ -113,7 +113,7 @@ def _stored_map() -> bytes:
     mesh = _mesh()
     maps = np.stack([mesh.points, _moved()])
     turns = np.zeros((len(mesh.tets), 3))
-    return storage.to_bytes(PreparedMap(_pair(), mesh, maps, turns, 0, "delaunay", "fine", ("Two.",), {}))
+    return storage.to_bytes(PreparedMap(_pair(), mesh, maps, turns, 0, "delaunay", "finest", ("Two.",), {}))
 
 
 @cache

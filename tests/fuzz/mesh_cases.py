@@ -63,7 +63,7 @@ def make(random: Random) -> tuple[Mesh, Settings, Any, Collider | None]:
         easing=_one_of(random, get_args(Easing)),
         extra_turns=int(random.choice([0, 0, 0, 0, 1, -3, 100])),
         engine="tetwild" if random.random() < 0.05 else "delaunay",
-        quality="draft",
+        quality="normal",
         seed=int(random.integers(2**31)),
         mesh_time_limit=10.0,
     )
@@ -89,8 +89,8 @@ def run(mesh: Mesh, settings: Settings, times: Array, collider: Collider | None)
 
 
 def coarser() -> None:
-    """Make quality ``draft`` ten times as fast."""
-    RESOLUTIONS["draft"] = Resolution(spacing=0.07, slope=0.4, largest=0.2)
+    """Make quality ``normal`` ten times as fast."""
+    RESOLUTIONS["normal"] = Resolution(spacing=0.07, slope=0.4, largest=0.2)
 
 
 def _require_sound(outcome: Outcome, task: Task) -> None:

@@ -30,12 +30,12 @@ def mesh(request: pytest.FixtureRequest) -> TetMesh:
         return made[request.param]()
     if not engine_available(request.param):
         pytest.skip(f"the engine {request.param} cannot run here")
-    return fill_cube(*icosphere(1), Settings(engine=request.param, quality="draft")).mesh
+    return fill_cube(*icosphere(1), Settings(engine=request.param, quality="normal")).mesh
 
 
 @pytest.fixture(scope="module")
 def coarse_volume() -> Iterator[None]:
-    """Quality ``draft`` ten times as fast, for what does not depend on how fine the volume is."""
+    """Quality ``normal`` ten times as fast, for what does not depend on how fine the volume is."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(RESOLUTIONS, "draft", Resolution(spacing=0.07, slope=0.4, largest=0.2))
+        patch.setitem(RESOLUTIONS, "normal", Resolution(spacing=0.07, slope=0.4, largest=0.2))
         yield

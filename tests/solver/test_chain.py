@@ -21,7 +21,7 @@ from qc3d_addon.solver.topology import sides, unique_edges
 from .meshes import arced, bent, box_surface, twisted
 
 BAR, FACES = box_surface((2, 2, 12), (1.0, 1.0, 5.0))
-SETTINGS = Settings(engine="delaunay", quality="draft")
+SETTINGS = Settings(engine="delaunay", quality="normal")
 
 
 def chain_of(keys: Sequence[Floats], settings: Settings = SETTINGS) -> list[PreparedMap]:
@@ -30,7 +30,7 @@ def chain_of(keys: Sequence[Floats], settings: Settings = SETTINGS) -> list[Prep
 
 
 def baked(parts: list[PreparedMap], times: Sequence[float] | Floats, mode: Mode = "natural") -> Bake:
-    return finish(chain_inbetweens(parts, times, Settings(mode=mode, engine="delaunay", quality="draft")))
+    return finish(chain_inbetweens(parts, times, Settings(mode=mode, engine="delaunay", quality="normal")))
 
 
 def velocities(parts: list[PreparedMap], time: float, step: float = 1e-3) -> tuple[Floats, Floats]:
@@ -117,7 +117,7 @@ def test_a_time_does_not_depend_on_its_neighbours(bending: list[PreparedMap]) ->
 
 def test_linear_mode_bakes_the_pairs_as_published(bending: list[PreparedMap]) -> None:
     bake = baked(bending, [0.25, 0.5, 0.75], "linear")
-    alone = finish(inbetweens(bending[0], [0.5], Settings(mode="linear", engine="delaunay", quality="draft")))
+    alone = finish(inbetweens(bending[0], [0.5], Settings(mode="linear", engine="delaunay", quality="normal")))
     np.testing.assert_array_equal(bake.frames[0], alone.frames[0])
     np.testing.assert_array_equal(bake.frames[1], bending[0].pair.key1)
 

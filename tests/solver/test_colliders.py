@@ -18,7 +18,7 @@ from qc3d_addon.solver.tetmesh import Floats, Ints
 from .meshes import icosphere
 
 TIMES = evenly_spaced(7)
-SETTINGS = Settings(engine="delaunay", quality="draft")
+SETTINGS = Settings(engine="delaunay", quality="normal")
 
 
 def bulging(points: Floats) -> Floats:
@@ -54,7 +54,7 @@ TURN = rotation_matrices(np.array([[0.3, 1.0, -0.5]]))[0]
 
 
 def bake(key0: Floats, key1: Floats, collider: Collider | None, mode: str = "natural") -> Bake:
-    settings = Settings(engine="delaunay", quality="draft", mode=mode)  # type: ignore[arg-type]
+    settings = Settings(engine="delaunay", quality="normal", mode=mode)  # type: ignore[arg-type]
     prepared = finish(prepare(KeyPair.checked(key0, key1, FACES), SETTINGS))
     return finish(chain_inbetweens([prepared], TIMES, settings, collider))
 

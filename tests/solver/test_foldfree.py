@@ -259,7 +259,7 @@ def test_real_keys_have_no_folds(data_folder: Path, file: str, first: str, secon
         names = arrays["shape_names"].tolist()
         key0, key1 = (arrays[f"V{names.index(name)}"] for name in (first, second))
         pair = KeyPair.checked(key0, key1, arrays["faces"])
-    prepared = finish(prepare(pair, Settings(engine="delaunay", quality="draft")))
+    prepared = finish(prepare(pair, Settings(engine="delaunay", quality="normal")))
     assert_a_map_of_the_cube(prepared.mesh, prepared.mapped)
     assert prepared.folds(prepared.mapped) == 0
     moved = np.linalg.norm(pair.key1 - pair.key0, axis=1).max() / pair.diagonal

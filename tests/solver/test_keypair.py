@@ -85,7 +85,7 @@ class TestSettings:
         [
             ({"mode": "cubic"}, "Unknown mode 'cubic'; choose one of "),
             ({"engine": "tetgen"}, "Unknown engine 'tetgen'; choose one of auto, tetwild, delaunay."),
-            ({"quality": "best"}, "Unknown quality 'best'; choose one of draft, normal, fine."),
+            ({"quality": "best"}, "Unknown quality 'best'; choose one of normal, fine, finest."),
             ({"mesh_time_limit": 0.0}, "The time limit of meshing is 0.0 s; it must be positive."),
             ({"mesh_time_limit": float("nan")}, "The time limit of meshing is nan s"),
             ({"seed": -1}, "The seed is -1; it must be 0 or more."),

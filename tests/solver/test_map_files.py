@@ -19,7 +19,7 @@ from qc3d_addon.solver.settings import Settings
 
 KEPT = KeptMaps(
     ("rest", "jäw", "rest", "jäw"),  # the way back and again: two maps
-    Settings(stretch="logarithmic", extra_turns=-2, engine="delaunay", quality="fine", seed=7),
+    Settings(stretch="logarithmic", extra_turns=-2, engine="delaunay", quality="finest", seed=7),
     {("rest", "jäw"): b"one", ("jäw", "rest"): b""},
 )
 FIXED = 14
@@ -74,8 +74,8 @@ def test_another_version(path: Path) -> None:
         {"sizes": [3.0, 0]},
         {"sizes": [2**70, 0]},
         {"settings": {}},
-        {"settings": {"stretch": "linear", "extra_turns": 0, "engine": "other", "quality": "fine", "seed": 0}},
-        {"settings": {"stretch": "linear", "extra_turns": 0, "engine": "auto", "quality": "fine", "seed": 2**31}},
+        {"settings": {"stretch": "linear", "extra_turns": 0, "engine": "other", "quality": "finest", "seed": 0}},
+        {"settings": {"stretch": "linear", "extra_turns": 0, "engine": "auto", "quality": "finest", "seed": 2**31}},
         {"settings": {"stretch": "linear", "extra_turns": "0", "engine": "auto", "quality": [], "seed": 0}},
     ],
 )

@@ -18,14 +18,14 @@ from qc3d_addon.solver.tetmesh import Floats
 
 from .meshes import icosphere
 
-SETTINGS = Settings(engine="delaunay", quality="draft")
+SETTINGS = Settings(engine="delaunay", quality="normal")
 TURN = rotation_matrices(np.array([[0.3, -0.4, 0.5]]))[0]
 
 
 def chain(*shapes: Floats, mode: str = "natural") -> Bake:
     """The bake with one in-between of every two shapes of the sphere."""
     faces = icosphere(2)[1]
-    settings = Settings(engine="delaunay", quality="draft", mode=mode)  # type: ignore[arg-type]
+    settings = Settings(engine="delaunay", quality="normal", mode=mode)  # type: ignore[arg-type]
     pairs = [KeyPair.checked(first, second, faces) for first, second in pairwise(shapes)]
     prepared = [finish(prepare(pair, SETTINGS)) for pair in pairs]
     return finish(chain_inbetweens(prepared, evenly_spaced(2 * len(pairs) - 1), settings))
@@ -43,7 +43,7 @@ def test_a_sphere_that_grows_and_turns() -> None:
     np.testing.assert_allclose(measures["stretch"][2], 1.5, atol=1e-6)
     for name in ("volume", "dilatation"):
         np.testing.assert_allclose(measures[name][0], 1.0, atol=1e-5)
-    # Inside, the map grows like the surface; a draft's tetrahedra reach from there into the space that has to shrink.
+    # Inside, the map grows like the surface; coarse tetrahedra reach from there into the space that has to shrink.
     assert 0.7 < np.median(measures["volume"][2]) / 1.5**3 < 1.05
     assert np.median(measures["dilatation"][2]) < 1.5
 

@@ -22,16 +22,16 @@ KEYS = ("Basis", "Up")
 @pytest.mark.parametrize(
     ("vertices", "frames", "quality", "measured"),
     [
-        (12, 7, "draft", 68),
-        (12, 7, "fine", 209),
-        (12, 49, "normal", 99),
-        (6890, 7, "draft", 110),
-        (6890, 7, "normal", 208),
-        (6890, 7, "fine", 238),
-        (6890, 49, "normal", 203),
-        (27554, 7, "normal", 278),
-        (110210, 7, "normal", 844),
-        (440834, 7, "normal", 2861),
+        (12, 7, "normal", 68),
+        (12, 7, "finest", 209),
+        (12, 49, "fine", 99),
+        (6890, 7, "normal", 110),
+        (6890, 7, "fine", 208),
+        (6890, 7, "finest", 238),
+        (6890, 49, "fine", 203),
+        (27554, 7, "fine", 278),
+        (110210, 7, "fine", 844),
+        (440834, 7, "fine", 2861),
     ],
 )
 def test_the_estimate_is_above_what_was_measured_and_near_it(
@@ -43,7 +43,7 @@ def test_the_estimate_is_above_what_was_measured_and_near_it(
 
 
 def test_a_hundred_thousand_vertices_need_less_than_4_gb() -> None:
-    for quality in ("draft", "normal", "fine"):
+    for quality in ("normal", "fine", "finest"):
         assert estimated_mb(100_000, 1, 22, quality) < 4096.0  # type: ignore[arg-type]
 
 
@@ -59,9 +59,9 @@ def test_a_million_vertices_are_refused_before_anything_starts() -> None:
 
 
 def test_more_keys_and_frames_need_more() -> None:
-    assert estimated_mb(10**5, 3, 7, "normal") > 2.5 * estimated_mb(10**5, 1, 7, "normal")
-    assert estimated_mb(10**5, 1, 1000, "normal") > 10_000.0
-    assert estimated_mb(10**5, 1, 7, "normal", needs_maps=False) < 300.0
+    assert estimated_mb(10**5, 3, 7, "fine") > 2.5 * estimated_mb(10**5, 1, 7, "fine")
+    assert estimated_mb(10**5, 1, 1000, "fine") > 10_000.0
+    assert estimated_mb(10**5, 1, 7, "fine", needs_maps=False) < 300.0
 
 
 def test_the_sentence_says_what_to_do() -> None:

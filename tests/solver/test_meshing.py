@@ -29,7 +29,7 @@ ENGINES = [
 
 
 def fill(points: Floats, faces: Ints, engine: str, **choices: object) -> FilledCube:
-    return fill_cube(points, faces, Settings(engine=engine, **{"quality": "draft", **choices}))  # type: ignore[arg-type]
+    return fill_cube(points, faces, Settings(engine=engine, **{"quality": "normal", **choices}))  # type: ignore[arg-type]
 
 
 def assert_partition_of_the_cube(mesh: TetMesh) -> None:
@@ -114,7 +114,7 @@ def test_point_clouds_are_surrounded_by_the_second_engine(name: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_finer_qualities_have_more_tetrahedra(engine: str) -> None:
     counts = [
-        len(fill(*icosphere(2, 0.12), engine, quality=quality).mesh.tets) for quality in ("draft", "normal", "fine")
+        len(fill(*icosphere(2, 0.12), engine, quality=quality).mesh.tets) for quality in ("normal", "fine", "finest")
     ]
     assert counts == sorted(counts)
     assert counts[2] > 1.5 * counts[0]
@@ -235,7 +235,7 @@ def test_real_meshes(data_folder: Path, name: str, shapes: tuple[str, str]) -> N
         faces = archive["faces"].astype(np.int64)
     low, high = np.minimum(first.min(0), second.min(0)), np.maximum(first.max(0), second.max(0))
     points = 0.5 + (first - 0.5 * (low + high)) * (0.66 / (high - low).max())
-    mesh = fill(points, faces, "delaunay", quality="normal").mesh
+    mesh = fill(points, faces, "delaunay", quality="fine").mesh
     assert_partition_of_the_cube(mesh)
     assert 8_000 < len(mesh.tets) < 40_000
     assert smallest_dihedral_angles(mesh).min() > 10.0

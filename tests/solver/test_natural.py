@@ -28,13 +28,13 @@ pytestmark = pytest.mark.usefixtures("coarse_volume")
 LENGTH = 5.0
 BAR, FACES = box_surface((2, 2, 16), (1.0, 1.0, LENGTH))
 TIMES = [0.0, 0.2, 0.5, 0.8, 1.0]
-DRAFT = Settings(engine="delaunay", quality="draft")
+NORMAL = Settings(engine="delaunay", quality="normal")
 
 
 def baked(
     key0: Floats, key1: Floats, faces: Ints, times: list[float], extra_turns: int = 0, law: StretchLaw = "linear"
 ) -> Bake:
-    choice = replace(DRAFT, stretch=law, extra_turns=extra_turns)
+    choice = replace(NORMAL, stretch=law, extra_turns=extra_turns)
     prepared = finish(prepare(KeyPair.checked(key0, key1, faces), choice))
     bake = finish(inbetweens(prepared, times, choice))
     assert not any(bake.report["folds"]["frames"])
@@ -187,11 +187,11 @@ PAIRS = {
 
 @cache
 def prepared_once(name: str) -> PreparedMap:
-    return finish(prepare(KeyPair.checked(*PAIRS[name]), DRAFT))
+    return finish(prepare(KeyPair.checked(*PAIRS[name]), NORMAL))
 
 
 def frames_at(name: str, times: list[float]) -> Floats:
-    return finish(inbetweens(prepared_once(name), times, DRAFT)).frames
+    return finish(inbetweens(prepared_once(name), times, NORMAL)).frames
 
 
 class TestTime:

@@ -21,7 +21,7 @@ from qc3d_addon.solver.settings import Mode, Settings
 
 from .meshes import arced, bent, box_surface, icosphere, kuhn_grid
 
-DRAFT = Settings(engine="delaunay", quality="draft")
+NORMAL = Settings(engine="delaunay", quality="normal")
 TIMES = [0.0, 0.25, 0.5, 1.0 / 3.0, 1.0]
 MODES: list[Mode] = ["natural", "linear"]
 BAR, FACES = box_surface((2, 2, 12), (1.0, 1.0, 5.0))
@@ -34,12 +34,12 @@ KEYS = {
 
 @cache
 def prepared_once(name: str) -> PreparedMap:
-    return finish(prepare(KeyPair.checked(*KEYS[name], FACES), DRAFT))
+    return finish(prepare(KeyPair.checked(*KEYS[name], FACES), NORMAL))
 
 
 @cache
 def baked_once(name: str, mode: Mode) -> Bake:
-    return finish(inbetweens(prepared_once(name), TIMES, replace(DRAFT, mode=mode)))
+    return finish(inbetweens(prepared_once(name), TIMES, replace(NORMAL, mode=mode)))
 
 
 @pytest.fixture(params=KEYS)
@@ -67,7 +67,7 @@ class TestPreparedMap:
         mesh = kuhn_grid(2)
         pair = KeyPair.checked(points, points, faces)
         maps = np.stack([mesh.points, mesh.points])
-        prepared = PreparedMap(pair, mesh, maps, np.zeros((len(mesh.tets), 3)), 0, "delaunay", "draft")
+        prepared = PreparedMap(pair, mesh, maps, np.zeros((len(mesh.tets), 3)), 0, "delaunay", "normal")
         values = mesh.points.copy()
         values[13] += [0.9, 0.0, 0.0]
         assert prepared.folds(values) == np.count_nonzero(np.linalg.det(mesh.jacobians(values)) <= 0.0) > 0
@@ -117,7 +117,7 @@ class TestFrames:
 
     def test_a_frame_does_not_depend_on_the_others(self, bake: tuple[PreparedMap, Bake]) -> None:
         prepared, made = bake
-        alone = finish(inbetweens(prepared, 0.5, replace(DRAFT, mode=made.report["mode"])))
+        alone = finish(inbetweens(prepared, 0.5, replace(NORMAL, mode=made.report["mode"])))
         assert alone.frames.shape[0] == 1
         np.testing.assert_array_equal(alone.frames[0], made.frames[2])
 
@@ -129,7 +129,7 @@ class TestFrames:
 
     def test_natural_frames_keep_lengths_better_than_the_straight_blend(self, prepared: PreparedMap) -> None:
         pair = prepared.pair
-        halfway = finish(inbetweens(prepared, 0.5, DRAFT)).frames[0]
+        halfway = finish(inbetweens(prepared, 0.5, NORMAL)).frames[0]
         edges = np.concatenate([FACES[:, [0, 1]], FACES[:, [1, 2]]])
 
         def lengths(points: np.ndarray) -> np.ndarray:
@@ -176,16 +176,16 @@ class TestTimes:
     @pytest.mark.parametrize("times", [[-0.1], [0.5, 1.0001], [np.nan], [np.inf], [[0.0, 1.0]], [None]])
     def test_refused(self, prepared: PreparedMap, times: list[Any]) -> None:
         with pytest.raises(InputError, match="times of the frames"):
-            finish(inbetweens(prepared, times, DRAFT))
+            finish(inbetweens(prepared, times, NORMAL))
 
     @pytest.mark.parametrize("mode", MODES)
     def test_none_at_all(self, prepared: PreparedMap, mode: Mode) -> None:
-        made = finish(inbetweens(prepared, [], replace(DRAFT, mode=mode)))
+        made = finish(inbetweens(prepared, [], replace(NORMAL, mode=mode)))
         assert made.frames.shape == (0, *prepared.pair.key0.shape)
         assert made.report["folds"]["frames"] == []
 
     def test_in_any_order_and_again(self, prepared: PreparedMap) -> None:
-        made = finish(inbetweens(prepared, [1.0, 0.0, 1.0], replace(DRAFT, mode="linear")))
+        made = finish(inbetweens(prepared, [1.0, 0.0, 1.0], replace(NORMAL, mode="linear")))
         np.testing.assert_array_equal(made.frames, [prepared.pair.key1, prepared.pair.key0, prepared.pair.key1])
 
 
@@ -193,8 +193,8 @@ class TestProgress:
     def test_stages_in_order_and_growing(self) -> None:
         seen: list[Progress] = []
         pair = KeyPair.checked(BAR, arced(BAR, 0.3), FACES)
-        prepared = finish(prepare(pair, DRAFT), seen.append)
-        finish(inbetweens(prepared, evenly_spaced(2), DRAFT), seen.append)
+        prepared = finish(prepare(pair, NORMAL), seen.append)
+        finish(inbetweens(prepared, evenly_spaced(2), NORMAL), seen.append)
         stages = [progress.stage for progress in seen]
         assert list(dict.fromkeys(stages)) == ["mesh", "locate", "fit", "factor", "frames"]
         assert stages == sorted(stages, key=["mesh", "locate", "fit", "factor", "frames"].index)
@@ -205,7 +205,7 @@ class TestProgress:
             assert fractions[-1] == 1.0
 
     def test_dropped_anywhere(self) -> None:
-        steps = prepare(KeyPair.checked(BAR, arced(BAR, 0.3), FACES), DRAFT)
+        steps = prepare(KeyPair.checked(BAR, arced(BAR, 0.3), FACES), NORMAL)
         for _ in range(5):
             next(steps)
         steps.close()
@@ -215,44 +215,44 @@ class TestProgress:
 
 class TestEngines:
     def test_the_delaunay_engine_repeats_itself(self, prepared: PreparedMap) -> None:
-        again = finish(prepare(prepared.pair, DRAFT))
+        again = finish(prepare(prepared.pair, NORMAL))
         np.testing.assert_array_equal(again.mesh.points, prepared.mesh.points)
         np.testing.assert_array_equal(again.mesh.tets, prepared.mesh.tets)
         np.testing.assert_array_equal(again.maps, prepared.maps)
 
     def test_equal_keys_give_equal_frames(self) -> None:
-        prepared = finish(prepare(KeyPair.checked(BAR, BAR, FACES), DRAFT))
+        prepared = finish(prepare(KeyPair.checked(BAR, BAR, FACES), NORMAL))
         for mode in MODES:
-            made = finish(inbetweens(prepared, [0.0, 0.4, 1.0], replace(DRAFT, mode=mode)))
+            made = finish(inbetweens(prepared, [0.0, 0.4, 1.0], replace(NORMAL, mode=mode)))
             np.testing.assert_array_equal(made.frames, np.broadcast_to(BAR, made.frames.shape))
 
     @pytest.mark.parametrize("mode", MODES)
     @pytest.mark.filterwarnings("error")
     def test_points_without_faces(self, mode: Mode) -> None:
         points = icosphere(0)[0]
-        prepared = finish(prepare(KeyPair.checked(points, 1.5 * points, np.empty((0, 3))), DRAFT))
-        made = finish(inbetweens(prepared, [0.0, 0.5, 1.0], replace(DRAFT, mode=mode)))
+        prepared = finish(prepare(KeyPair.checked(points, 1.5 * points, np.empty((0, 3))), NORMAL))
+        made = finish(inbetweens(prepared, [0.0, 0.5, 1.0], replace(NORMAL, mode=mode)))
         assert made.report["key_error"] < 1e-9
         assert np.isfinite(made.frames).all()
 
 
 def test_times_that_are_no_numbers_are_refused() -> None:
     with pytest.raises(InputError, match="numbers"):
-        finish(inbetweens(prepared_once("bending and moving"), ["soon"], DRAFT))
+        finish(inbetweens(prepared_once("bending and moving"), ["soon"], NORMAL))
 
 
 def test_a_mirrored_key_is_refused_before_the_cube_is_filled() -> None:
     pair = KeyPair.checked(BAR, BAR * [-1.0, 1.0, 1.0], FACES)
     with pytest.raises(InputError, match=r"mirrored or turned inside out.*Choose the mode straight"):
-        next(prepare(pair, DRAFT))
+        next(prepare(pair, NORMAL))
 
 
 def test_a_mirrored_part_is_met_and_a_note_says_what_that_is_worth() -> None:
     part = 0.3 * BAR + [3.0, 0.0, 0.0]
     key0, key1 = np.concatenate([BAR, part]), np.concatenate([BAR, part * [-1.0, 1.0, 1.0] + [6.0, 0.0, 0.0]])
     pair = KeyPair.checked(key0, key1, np.concatenate([FACES, FACES + len(BAR)]))
-    prepared = finish(prepare(pair, DRAFT))
-    bake = finish(inbetweens(prepared, [0.0, 0.5, 1.0], DRAFT))
+    prepared = finish(prepare(pair, NORMAL))
+    bake = finish(inbetweens(prepared, [0.0, 0.5, 1.0], NORMAL))
     assert any("mirrored" in note for note in bake.report["notes"])
     assert bake.report["folds"] == {"map": 0, "frames": [0, 0, 0]}
     np.testing.assert_array_equal(bake.frames[2], pair.key1)

@@ -91,5 +91,5 @@ def test_the_size_grows_with_the_distance_up_to_its_limit() -> None:
 
 
 def test_qualities_are_ordered() -> None:
-    spacings = [RESOLUTIONS[quality].spacing for quality in ("draft", "normal", "fine")]
+    spacings = [RESOLUTIONS[quality].spacing for quality in ("normal", "fine", "finest")]
     assert spacings == sorted(spacings, reverse=True)

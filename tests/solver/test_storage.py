@@ -34,7 +34,7 @@ def prepared() -> PreparedMap:
     maps = np.stack([mesh.points, half, full])
     turns = np.random.default_rng(0).normal(size=(len(mesh.tets), 3))
     return PreparedMap(
-        PAIR, mesh, maps, turns, 2, "delaunay", "fine", ("Ein Satz für dich – „so“.", "Two."), {"mesh": 1.0}
+        PAIR, mesh, maps, turns, 2, "delaunay", "finest", ("Ein Satz für dich – „so“.", "Two."), {"mesh": 1.0}
     )
 
 

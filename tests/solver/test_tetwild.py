@@ -188,7 +188,7 @@ def test_the_child_program_reports_bad_arguments_in_one_line(tmp_path: Path) -> 
     tetwild_loading.unavailable_reason() is not None, reason=f"tetwild: {tetwild_loading.unavailable_reason()}"
 )
 def test_the_cube_is_exact(tmp_path: Path) -> None:
-    mesh = tetwild.tetwild_mesh(*icosphere(2, 0.15), RESOLUTIONS["draft"], 0, 60.0)
+    mesh = tetwild.tetwild_mesh(*icosphere(2, 0.15), RESOLUTIONS["normal"], 0, 60.0)
     assert mesh.points.min() == 0.0
     assert mesh.points.max() == 1.0
     assert mesh.on_cube_face[mesh.boundary_faces].all(axis=1).any(axis=1).all()

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.usefixtures("coarse_volume")
 T = TypeVar("T")
 Keys = tuple[Floats, Floats, Ints] | tuple[Floats, Floats, Ints, Ints]
 
-DRAFT = Settings(engine="delaunay", quality="draft")
+NORMAL = Settings(engine="delaunay", quality="normal")
 MODES: list[Mode] = ["natural", "linear"]
 TIMES = [0.0, 0.2, 0.5, 0.9, 1.0]
 
@@ -201,7 +201,7 @@ def pair_of(kind: str) -> KeyPair:
 
 @cache
 def prepared_once(kind: str) -> PreparedMap:
-    return strictly(lambda: finish(prepare(pair_of(kind), DRAFT)))
+    return strictly(lambda: finish(prepare(pair_of(kind), NORMAL)))
 
 
 def times_of(kind: str) -> list[float]:
@@ -213,7 +213,7 @@ def baked_and_timed(kind: str, mode: Mode) -> tuple[Bake, float]:
     """A bake and the seconds of a processor that it took."""
     started = clock.process_time()
     prepared = prepared_once(kind)
-    bake = strictly(lambda: finish(inbetweens(prepared, times_of(kind), replace(DRAFT, mode=mode))))
+    bake = strictly(lambda: finish(inbetweens(prepared, times_of(kind), replace(NORMAL, mode=mode))))
     return bake, clock.process_time() - started
 
 
@@ -257,7 +257,7 @@ def test_bakes(kind: str, mode: Mode) -> None:
 class TestUnreachableKeys:
     @pytest.mark.parametrize("kind", UNREACHABLE)
     def test_refused_before_any_slow_work(self, kind: str) -> None:
-        steps = prepare(pair_of(kind), DRAFT)
+        steps = prepare(pair_of(kind), NORMAL)
         with pytest.raises(InputError, match=r"mirrored or turned inside out.* Choose the mode straight"):
             strictly(lambda: next(steps))
 
@@ -342,7 +342,7 @@ def test_a_motion_of_everything_is_an_exact_screw(degrees: float, pitch: float, 
         return np.asarray((BAR - place) @ turn.T + place + time * pitch * axis)
 
     prepared = screwed_once(degrees, pitch, screw(1.0).tobytes())
-    bake = strictly(lambda: finish(inbetweens(prepared, TIMES, replace(DRAFT, mode=mode))))
+    bake = strictly(lambda: finish(inbetweens(prepared, TIMES, replace(NORMAL, mode=mode))))
     # Half a turn may go either way.
     errors = []
     for way in [1.0, -1.0] if degrees == 180.0 else [1.0]:
@@ -355,13 +355,13 @@ def test_a_motion_of_everything_is_an_exact_screw(degrees: float, pitch: float, 
 @cache
 def screwed_once(degrees: float, pitch: float, key1: bytes) -> PreparedMap:
     pair = KeyPair.checked(BAR, np.frombuffer(key1).reshape(-1, 3), FACES)
-    return finish(prepare(pair, DRAFT))
+    return finish(prepare(pair, NORMAL))
 
 
 def test_scaling_by_a_power_of_two_scales_every_bit() -> None:
     factor = 2.0**20
     pair = KeyPair.checked(factor * BAR, factor * BENT, FACES)
-    scaled = finish(inbetweens(finish(prepare(pair, DRAFT)), TIMES, DRAFT))
+    scaled = finish(inbetweens(finish(prepare(pair, NORMAL)), TIMES, NORMAL))
     np.testing.assert_array_equal(scaled.frames, factor * baked_once("clean", "natural").frames)
 
 
@@ -383,9 +383,9 @@ def test_soups(seed: int) -> None:
     key1[20:23] = key1[random.integers(0, 20, size=3)]
     faces, edges = random.integers(0, 30, size=(random.integers(0, 60), 3)), random.integers(0, 30, size=(10, 2))
     pair = KeyPair.checked(key0, key1, faces, edges)
-    prepared = strictly(lambda: finish(prepare(pair, DRAFT)))
+    prepared = strictly(lambda: finish(prepare(pair, NORMAL)))
     for mode in MODES:
-        choice = replace(DRAFT, mode=mode)
+        choice = replace(NORMAL, mode=mode)
         assert_sound(strictly(lambda choice=choice: finish(inbetweens(prepared, TIMES, choice))), pair, mode)
 
 

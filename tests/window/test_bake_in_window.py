@@ -91,7 +91,7 @@ def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
 
 
 def test_a_bake_is_one_step_to_undo_and_can_be_made_again(window: Window) -> None:
-    window.ask("arm().qc3d.quality = 'draft'; remember('Draft')")
+    window.ask("arm().qc3d.quality = 'normal'; remember('Draft')")
     before = window.ask("state()")
     start(window)
     window.wait_for("job() is None")

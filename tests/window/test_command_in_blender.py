@@ -19,7 +19,7 @@ def test_ctrl_c_ends_the_command(root: Path, repository: Path) -> None:
         window.ask("bpy.ops.wm.save_userpref()")  # which add-ons are enabled
         before = sorted(path.name for path in window.folder.iterdir())
         files = [str(window.inside / name) for name in ("arm.blend", "out.blend")]
-        bake = ["bake", files[0], "--object", "Arm", "--from", FROM, "--to", TO, "--frames", "3", "--quality", "fine"]
+        bake = ["bake", files[0], "--object", "Arm", "--from", FROM, "--to", TO, "--frames", "3", "--quality", "finest"]
         command = ["chroot", str(root), "blender", "--background", "--command", "qc3d", *bake, "--output", files[1]]
         with subprocess.Popen(
             command,

@@ -35,7 +35,7 @@ def has_legend(window: Window, path: Path) -> bool:
 def test_the_button_the_menu_and_undo(window: Window, tmp_path: Path) -> None:
     window.ask(
         """
-arm().qc3d.quality = 'draft'
+arm().qc3d.quality = 'normal'
 view()[1].spaces.active.overlay.show_overlays = True
 view()[1].spaces.active.shading.color_type = 'OBJECT'
 remember('Draft')

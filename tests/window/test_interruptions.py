@@ -19,7 +19,7 @@ BAKE = "qc3d.bake_inbetweens"
 CHANGED = "'Arm' was changed meanwhile; nothing was written."
 
 
-def start(window: Window, quality: str = "draft") -> int:
+def start(window: Window, quality: str = "normal") -> int:
     """Press the button; the process that does the work."""
     window.ask(f"arm().qc3d.quality = '{quality}'")
     window.push(BAKE)
@@ -71,7 +71,7 @@ def test_an_undo_meanwhile_has_a_defined_outcome(window: Window) -> None:
 
 
 def test_there_is_never_more_than_one_bake(window: Window) -> None:
-    child = start(window, "fine")
+    child = start(window, "finest")
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
         window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('INVOKE_DEFAULT')")
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
@@ -82,7 +82,7 @@ def test_there_is_never_more_than_one_bake(window: Window) -> None:
 
 
 def test_another_file_ends_the_bake(window: Window, repository: Path) -> None:
-    child = start(window, "fine")
+    child = start(window, "finest")
     before = window.ask("state()")
     open_arm(window, repository)
     assert not is_alive(child)
@@ -94,7 +94,7 @@ def test_another_file_ends_the_bake(window: Window, repository: Path) -> None:
 
 
 def test_disabling_the_addon_ends_the_bake(window: Window) -> None:
-    child = start(window, "fine")
+    child = start(window, "finest")
     before = window.ask("state()")
     window.ask("bpy.ops.preferences.addon_disable(module=ADDON)")
     assert not is_alive(child)
@@ -109,7 +109,7 @@ def test_disabling_the_addon_ends_the_bake(window: Window) -> None:
 
 @pytest.mark.parametrize("how", ["quits", "is killed"])
 def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
-    child = start(own_window, "fine")
+    child = start(own_window, "finest")
     if how == "quits":
         with contextlib.suppress(ConnectionError):  # Blender may answer first
             own_window.ask("bpy.ops.wm.quit_blender()")
@@ -131,7 +131,7 @@ def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
 )
 def test_a_child_that_dies_or_hangs_is_said_and_changes_nothing(window: Window, ending: int, sentence: str) -> None:
     before = window.ask("state()")
-    child = start(window, "fine")
+    child = start(window, "finest")
     os.kill(child, ending)
     if ending == signal.SIGSTOP:
         window.ask("import sys; sys.modules[ADDON + '.blender.jobs'].current()._worker._deadline = 0.0")

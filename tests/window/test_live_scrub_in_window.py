@@ -33,7 +33,7 @@ def offset():
     return float(abs(points('QC3D Preview') - points('Basis')).max()) if 'QC3D Preview' in names() else 0.0
 
 bpy.context.preferences.inputs.use_mouse_continuous = False  # a mouse that is put somewhere by a program
-arm().qc3d.quality = 'draft'
+arm().qc3d.quality = 'normal'
 remember('Draft')
 """
     )
@@ -141,7 +141,7 @@ lean.points.foreach_set('co', (rest + np.maximum(rest[:, 2:], 0) ** 2 * np.float
 arm().hide_set(True)
 view()[1].spaces.active.shading.type = 'SOLID'
 with inside('WINDOW'):
-    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=3, quality='draft', engine='delaunay')
+    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=3, quality='normal', engine='delaunay')
 
 class Drag:
     '''Moves the slider a little between redraws, and notes where it is and what is shown at each.'''
@@ -181,7 +181,7 @@ Drag.watched = int(np.argmax(rest[:, 2] - abs(rest[:, 1]) + 0.5 * rest[:, 0]))
     window.ask(
         """
 with inside('WINDOW'):
-    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=99, quality='draft', engine='delaunay')
+    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=99, quality='normal', engine='delaunay')
 keys = ball.data.shape_keys.key_blocks
 """
     )

@@ -31,7 +31,7 @@ KEYS = ("Basis", "Bent")
 PATIENCE = 60.0
 
 
-def small_task(quality: str = "draft") -> Task:
+def small_task(quality: str = "normal") -> Task:
     points, faces = box_surface((2, 2, 6), (1.0, 1.0, 4.0))
     shapes = {"Basis": points, "Bent": twisted(points, 0.8)}
     settings = Settings(engine="delaunay", quality=quality)  # type: ignore[arg-type]
@@ -239,7 +239,7 @@ class TestTheRealChild:
     ) -> None:
         monkeypatch.setattr(Task, "require_memory", lambda *_: None)  # as where the estimate is too low
         with pytest.raises(WorkerError, match=f"not enough memory within its limit of {megabytes} MB; use fewer") as e:
-            client.run(small_task("fine"), None, Limits(memory_mb=megabytes))
+            client.run(small_task("finest"), None, Limits(memory_mb=megabytes))
         assert "allow it more in the add-on's preferences" in str(e.value)
         assert list(temporary.iterdir()) == []
 
@@ -252,7 +252,7 @@ class TestTheRealChild:
         assert list(temporary.iterdir()) == []
 
     def test_killed_from_outside(self, temporary: Path) -> None:
-        worker = Worker(small_task("fine"))
+        worker = Worker(small_task("finest"))
         pid = worker._process.pid
         while worker.progress is None:
             assert worker.poll() is None
@@ -280,7 +280,7 @@ class TestTheRealChild:
             "from qc3d_addon.worker.client import Worker\n"
             # A job in the background starts with Ctrl-C ignored.
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-            "worker = Worker(small_task('fine'))\n"
+            "worker = Worker(small_task('finest'))\n"
             "while worker.progress is None: worker.poll()\n"
             "print(worker._process.pid, flush=True)\n"
             "worker._process.wait()\n"

@@ -31,7 +31,7 @@ def task_with(
     engine: Engine, mode: Mode = "natural", seed: int = 3, kept: dict[tuple[str, str], bytes] | None = None
 ) -> Task:
     points, faces = box_surface((2, 2, 8), (1.0, 1.0, 5.0))
-    settings = Settings(engine=engine, quality="draft", mode=mode, seed=seed)
+    settings = Settings(engine=engine, quality="normal", mode=mode, seed=seed)
     shapes = {"Basis": points, "Bent": arced(points, 0.9)}
     no_edges = np.empty((0, 2), dtype=np.int64)
     return Task.of_keys(shapes, faces, no_edges, KEYS, settings, evenly_spaced(2), kept)
@@ -67,7 +67,7 @@ def test_another_seed_gives_another_mesh_and_other_frames() -> None:
 
 
 def test_the_seeded_mesh_is_the_same_bit_for_bit() -> None:
-    meshes = [fill_cube(*icosphere(2), Settings(engine="delaunay", quality="draft", seed=5)).mesh for _ in range(2)]
+    meshes = [fill_cube(*icosphere(2), Settings(engine="delaunay", quality="normal", seed=5)).mesh for _ in range(2)]
     np.testing.assert_array_equal(meshes[0].points, meshes[1].points)
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
 

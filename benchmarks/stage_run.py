@@ -80,7 +80,7 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
 
 def _one_frame(prepared: PreparedMap) -> dict[str, float]:
     """Seconds of one frame, of the back-substitutions in it, and of the same ones by themselves, over and over."""
-    from qc3d_addon.solver import surface_sweeps, volume_path
+    from qc3d_addon.solver import moving_surface, volume_path
     from qc3d_addon.solver.factorization import factored
     from qc3d_addon.solver.natural import NaturalFrames
 
@@ -90,7 +90,7 @@ def _one_frame(prepared: PreparedMap) -> dict[str, float]:
         watches.append(_Stopwatch(factored(matrix)))
         return watches[-1]
 
-    with patch.object(volume_path, "factored", watched), patch.object(surface_sweeps, "factored", watched):
+    with patch.object(volume_path, "factored", watched), patch.object(moving_surface, "factored", watched):
         maker = NaturalFrames(replace(prepared, paths={}))
     middle = np.array([0.4])
     list(maker.frames(middle))  # what is made on first use

@@ -108,14 +108,14 @@ def tangents_of(rotations: Floats, bases: Floats) -> Floats:
 
 
 def stretched(stretch: Floats, vectors: Floats) -> Floats:
-    """(3, 2, m) pairs of vectors (3, 2, m), mixed by symmetric stretches (m, 2, 2)."""
-    along, mixed, across = stretch[:, 0, 0], stretch[:, 0, 1], stretch[:, 1, 1]
+    """(3, 2, ...) pairs of vectors (3, 2, ...), mixed by symmetric stretches (..., 2, 2)."""
+    along, mixed, across = stretch[..., 0, 0], stretch[..., 0, 1], stretch[..., 1, 1]
     first, second = vectors[:, 0], vectors[:, 1]
     return np.stack([along * first + mixed * second, mixed * first + across * second], axis=1)
 
 
 def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
-    """(3, 2, m) orthogonal pairs of ``lengths`` (m,), in the directions closest to pairs of vectors (3, 2, m).
+    """(3, 2, ..., m) orthogonal pairs of ``lengths`` (m,), in the directions closest to pairs of vectors.
 
     The directions are the polar factor A (A^T A)^-1/2. The inverse root of the 2 x 2 matrix C = A^T A comes from the
     theorem of Cayley and Hamilton: with s = sqrt(det C), C^1/2 = (C + s I) / sqrt(tr C + 2 s).
@@ -137,7 +137,7 @@ def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
 
 
 def cross_product(first: Floats, second: Floats) -> Floats:
-    """(3, k) cross products of vectors (3, k), stored by coordinate."""
+    """(3, ...) cross products of vectors (3, ...), stored by coordinate."""
     (x, y, z), (u, v, w) = first, second
     product = np.empty((3, *x.shape))
     np.subtract(y * w, z * v, out=product[0])

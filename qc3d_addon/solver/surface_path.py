@@ -13,6 +13,7 @@ from .anchors import ScrewAnchors
 from .branches import Turning, consistent_turning
 from .embedding import Embedding
 from .enclosed import ClosedComponents
+from .moving_surface import MovingSurface
 from .rates import (
     EndCorrection,
     Rates,
@@ -25,7 +26,7 @@ from .rates import (
 )
 from .stretch import Stretch, StretchLaw
 from .surface import TriangleDeformation, tangents_of
-from .surface_sweeps import MovingSurface, Solving, Sweeps, Wanted, solved_together
+from .surface_sweeps import Sweeps, Wanted
 from .tetmesh import Floats, Ints
 from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
 
@@ -151,10 +152,10 @@ class SurfacePath:
 
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
         """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
-        settled = solved_together(self._surface, [self._settling(*moment, sweeps) for moment in moments])
+        settled = Sweeps(self._surface, [self._wanted(*moment) for moment in moments]).settled(sweeps)
         return [shape[self._group] for shape in settled]
 
-    def _settling(self, time: float, anchor: Floats | None, sweeps: int) -> Solving[Floats]:
+    def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
         stretch = self._moving_stretch.at(time, self._law)
         lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
@@ -170,8 +171,7 @@ class SurfacePath:
         )
         start = self._key0 + time * self._travel
         start[self._free] = anchors[self._free]
-        wanted = Wanted(stretch, anchors, lengths[self._surface.springs], volumes)
-        return Sweeps(self._surface, start, wanted).settling(tangents, sweeps)
+        return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
 
 
 def _spans(positions: Floats, edges: Ints) -> Floats:

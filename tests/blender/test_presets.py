@@ -23,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_saved_and_taken_up_again(figure: bpy.types.Object, folder: Path) -> None:
-    chosen = {"count": 11, "use_tolerance": True, "mode": "linear", "quality": "finest", "engine": "delaunay", "seed": 5}
+    chosen = {"count": 11, "use_tolerance": True, "mode": "linear", "quality": "fine", "engine": "delaunay", "seed": 5}
     for name, value in chosen.items():
         setattr(figure.qc3d, name, value)
     figure.qc3d.from_key = "Basis"

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qc3d_addon.solver import surface_sweeps
 from qc3d_addon.solver.embedding import Embedding
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.rotations import rotation_matrices
@@ -92,6 +93,17 @@ class TestEveryPair:
         steps = np.abs(np.diff(shapes, axis=0)).max(axis=(1, 2))
         # No step is much longer than the others: nothing jumps.
         assert steps.max() <= 2.0 * np.median(steps) + 1e-12
+
+    @pytest.mark.parametrize("at_once", [1, 10**6])
+    def test_shapes_solved_together_are_those_of_each(
+        self, pair: tuple[Embedding, SurfacePath], at_once: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(surface_sweeps, "_TRIANGLES_AT_ONCE", at_once)
+        times = (0.0, 0.2, 0.7, 1.0, 0.7)
+        together = pair[1].shapes([(time, None) for time in times])
+        for time, shape in zip(times, together, strict=True):
+            np.testing.assert_allclose(shape, pair[1].positions(time), rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(together[2], together[4], rtol=0.0, atol=1e-13)
 
     def test_the_same_time_gives_the_same_shape(self, pair: tuple[Embedding, SurfacePath]) -> None:
         _, path = pair

@@ -117,7 +117,7 @@ class Sweeps:
     def _sweep(self, sweeps: int) -> None:
         iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
         going = np.ones(len(self._wanted), dtype=bool)
-        self._move(self._corrected(np.stack([shape.tangents for shape in self._wanted], axis=2)))
+        self._move(self._corrected(True))
         for sweep in range(1, sweeps):
             present, refitted = self._moved.copy(), self._refitted()
             # The first half gets by without volumes.
@@ -129,7 +129,7 @@ class Sweeps:
                 break
             following = iteration.next(present, refitted)
             self._move(following if going.all() else np.where(going[:, None], following, present))
-        self._move(self._corrected(np.concatenate([self._closest_tangents(part) for part in self._operators], axis=2)))
+        self._move(self._corrected(False))
         self._restore_volumes()
 
     @property
@@ -175,16 +175,23 @@ class Sweeps:
             load += _applied(self._surface.spans.T, self._wanted_spans())[:, :, self._moving]
         return self._surface.solve(load)
 
-    def _corrected(self, tangents: Floats) -> Floats:
-        """Positions (3, q, k) fitted to tangents (3, 2, q, m), solved for the change.
+    def _corrected(self, first: bool) -> Floats:
+        """Positions (3, q, k) fitted at first to the wanted tangents, later to the closest, and solved for the change.
 
         Where the present positions are right, needles and tiny parts do not spoil them.
         """
         surface = self._surface
-        gradients = _applied(surface.gradient, self._positions)
-        missing = stretched(self._stretch, tangents).transpose(0, 2, 1, 3).reshape(gradients.shape) - gradients
-        load = _applied(surface.gradient.T, missing * np.tile(surface.weights, 2))[:, :, self._moving]
-        load += surface.anchor_weights * (self._anchors - self._moved)
+        load = surface.anchor_weights * (self._anchors - self._moved)
+        for operator in self._operators:
+            shapes = operator.shapes
+            if first:
+                tangents = np.stack([shape.tangents for shape in self._wanted[shapes]], axis=2)
+            else:
+                tangents = self._closest_tangents(operator)
+            gradients = _applied(surface.gradient, self._positions[:, shapes])
+            missing = stretched(self._stretch[shapes], tangents).transpose(0, 2, 1, 3).reshape(gradients.shape)
+            missing = (missing - gradients) * np.tile(surface.weights, 2)
+            load[:, shapes] += _applied(surface.gradient.T, missing)[:, :, self._moving]
         if self._lengths.size:
             missing_spans = self._wanted_spans() - _applied(surface.spans, self._positions)
             load += _applied(surface.spans.T, missing_spans)[:, :, self._moving]

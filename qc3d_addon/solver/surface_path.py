@@ -28,7 +28,7 @@ from .stretch import Stretch, StretchLaw
 from .surface import TriangleDeformation, tangents_of
 from .surface_sweeps import Sweeps, Wanted
 from .tetmesh import Floats, Ints
-from .topology import face_adjacency, sides, unique_edges, vertex_components, welded
+from .topology import among, face_adjacency, sides, unique_edges, vertex_components, welded
 
 ANCHOR_WEIGHT = 0.05
 SWEEPS = 13
@@ -183,5 +183,5 @@ def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
     every = unique_edges(np.concatenate([sides(faces), wires]))
     held = unique_edges(sides(usable))
     span = int(every.max(initial=0)) + 1
-    covered = np.isin(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
+    covered = among(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
     return np.asarray(every[~covered])

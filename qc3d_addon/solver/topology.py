@@ -42,6 +42,13 @@ def distinct(numbers: Ints) -> Ints:
     return ordered[np.diff(ordered, prepend=ordered[:1] - 1) > 0]
 
 
+def among(numbers: Ints, known: Ints) -> Bools:
+    """(n,) whether the numbers (n,) are among ``known`` (k,), which are sorted."""
+    if not len(known):
+        return np.zeros(len(numbers), dtype=bool)
+    return np.asarray(known[np.minimum(np.searchsorted(known, numbers), len(known) - 1)] == numbers)
+
+
 def unique_edges(edges: Ints) -> Ints:
     """(k, 2) edges without repetition and without loops."""
     low, high = edges.min(axis=1), edges.max(axis=1)

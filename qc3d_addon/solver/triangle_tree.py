@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .tetmesh import Bools, Floats, Ints
-from .topology import distinct
+from .topology import among, distinct
 
 # So many pairs of boxes are compared at once.
 _CHUNK = 2_000_000
@@ -122,8 +122,7 @@ def _unique(first: Ints, second: Ints, count: int) -> Pairs:
 
 
 def _without(pairs: Pairs, others: Pairs, count: int) -> Pairs:
-    codes, known = pairs[0] * count + pairs[1], others[0] * count + others[1]
-    kept = known[np.minimum(np.searchsorted(known, codes), len(known) - 1)] != codes
+    kept = ~among(pairs[0] * count + pairs[1], others[0] * count + others[1])
     return pairs[0][kept], pairs[1][kept]
 
 

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.tetmesh import Ints
 from qc3d_addon.solver.topology import (
+    among,
     closed_faces,
+    distinct,
     face_adjacency,
     sides,
     unique_edges,
@@ -25,6 +27,16 @@ TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 faces_of_anything = st.lists(
     st.permutations(range(8)).map(lambda order: order[:3]), min_size=1, max_size=20
 ).map(np.array)
+
+
+numbers = st.lists(st.integers(-20, 20), max_size=40).map(lambda values: np.array(values, dtype=np.int64))
+
+
+@given(numbers, numbers)
+def test_distinct_numbers_and_which_are_among_them(values: Ints, others: Ints) -> None:
+    known = distinct(values)
+    assert known.tolist() == sorted(set(values.tolist()))
+    assert among(others, known).tolist() == [other in set(values.tolist()) for other in others.tolist()]
 
 
 def closed(faces: Ints, count: int | None = None) -> list[bool]:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from itertools import chain, islice
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -49,12 +50,15 @@ def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterato
 
     Dropping the iterator ends the work after the pieces that have begun. What a piece raises is raised in its turn.
     """
-    threads = thread_count()
-    remaining = iter(items)
+    threads, remaining = thread_count(), iter(items)
+    first = list(islice(remaining, 2))
+    if len(first) < 2 or threads == 1:  # a thread would cost time and gain none
+        yield from map(work, chain(first, remaining))
+        return
     with ThreadPoolExecutor(threads) as pool:
         running: deque[Future[Result]] = deque()
         try:
-            for item in remaining:
+            for item in chain(first, remaining):
                 running.append(pool.submit(work, item))
                 if len(running) > threads:
                     yield running.popleft().result()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from .rotations import rotation_vectors
+from .rotations import products, rotation_vectors
 from .stretch import Stretch
 from .tetmesh import Floats, Ints
 
@@ -102,9 +102,9 @@ def gradient_operator(faces: Ints, gradients: Floats, count: int) -> csr_array:
     return csr_array((values, columns, np.arange(0, 6 * len(faces) + 1, 3)), shape=(2 * len(faces), count))
 
 
-def tangents_of(rotations: Floats, bases: Floats) -> Floats:
-    """(3, 2, m) the two tangents of ``bases`` (m, 3, 3) after ``rotations`` (m, 3, 3), by coordinate."""
-    return np.ascontiguousarray((rotations @ bases[:, :, :2]).transpose(1, 2, 0))
+def tangents_of(rotations: Floats, tangents: Floats) -> Floats:
+    """(3, 2, m) pairs of tangents, the columns of (m, 3, 2), after ``rotations`` (m, 3, 3), by coordinate."""
+    return products(rotations, tangents).transpose(1, 2, 0)
 
 
 def stretched(stretch: Floats, vectors: Floats) -> Floats:

@@ -24,6 +24,7 @@ from .rates import (
     strain_of_slope,
     stretch_slopes,
 )
+from .rotations import by_component
 from .stretch import Stretch, StretchLaw
 from .surface import TriangleDeformation, tangents_of
 from .surface_sweeps import Sweeps, Wanted
@@ -97,7 +98,9 @@ class SurfacePath:
         )
         rows = self._surface.rows
         self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
-        self._moving_stretch = Stretch(usable.stretch.values[rows], usable.stretch.vectors[rows])
+        values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
+        self._moving_stretch = Stretch(by_component(values), by_component(vectors))
+        self._moving_tangents = by_component(usable.bases[rows, :, :2])
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
         """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
@@ -166,9 +169,7 @@ class SurfacePath:
             stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
             turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
-        tangents = tangents_of(
-            self._moving_turning.at(time, turn_change), self.deformation.bases[self._surface.rows]
-        )
+        tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
         start = self._key0 + time * self._travel
         start[self._free] = anchors[self._free]
         return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)

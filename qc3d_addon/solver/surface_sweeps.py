@@ -74,7 +74,7 @@ class _Operator(NamedTuple):
     @classmethod
     def of(cls, surface: MovingSurface, shapes: slice, stretch: Floats) -> _Operator:
         """Of a surface and the stretches (q, m, 2, 2) of the shapes."""
-        values = (surface.hats @ stretch).transpose(0, 3, 1, 2)
+        values = np.einsum("mcb,qmbd->qdmc", surface.hats, stretch, order="C")
         first = len(surface.used) * np.arange(len(stretch))[:, None, None, None]
         columns = np.broadcast_to(surface.faces + first, values.shape)
         gradient = csr_array(

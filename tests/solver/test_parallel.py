@@ -13,7 +13,8 @@ from qc3d_addon.solver.parallel import in_threads, thread_count
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
-    assert list(in_threads(lambda number: number**2, range(50))) == [number**2 for number in range(50)]
+    for amount in (0, 1, 2, 50):
+        assert list(in_threads(lambda number: number**2, range(amount))) == [number**2 for number in range(amount)]
 
 
 def test_nothing_is_begun_far_ahead_and_dropping_ends_it() -> None:

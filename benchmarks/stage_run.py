@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time the stages of one bake in a process of its own, and print them as JSON.
 
-    python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS       the stages, the warm bake, the floor of a frame
+    python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS       the stages and the warm bake
+    python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS one   also one frame and its floor
     python -m benchmarks.stage_run CASE yardstick                fTetWild with its own defaults on the first shape
 """
 
@@ -38,15 +39,15 @@ _REPEATS = 15
 def main(arguments: list[str]) -> None:
     """Print one JSON object."""
     case, engine = arguments[:2]
-    found = yardstick(case) if engine == "yardstick" else stages(case, engine, int(arguments[2]))
+    found = yardstick(case) if engine == "yardstick" else stages(case, engine, int(arguments[2]), arguments[3:] == ["one"])
     usage = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
     found |= {"peak_mb": usage[0].ru_maxrss / 1024.0, "peak_child_mb": usage[1].ru_maxrss / 1024.0}
     found |= {"cpu": sum(part.ru_utime + part.ru_stime for part in usage)}
     json.dump(found, sys.stdout)
 
 
-def stages(case: str, engine: str, count: int) -> dict[str, Any]:
-    """Seconds of each stage of a cold bake, of a warm one and of a second one, and the floor of a frame."""
+def stages(case: str, engine: str, count: int, one: bool) -> dict[str, Any]:
+    """Seconds of each stage of a cold bake and of a warm one; if so wished, of one frame and its floor."""
     started = clock.perf_counter()
     from qc3d_addon.solver.keypair import KeyPair
     from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
@@ -70,7 +71,7 @@ def stages(case: str, engine: str, count: int) -> dict[str, Any]:
         "cold": cold,
         "warm": warm,
         **{f"stage_{name}": value for name, value in seconds.items()},
-        **_one_frame(prepared),
+        **(_one_frame(prepared) if one else {}),
         "count": count,
     }
     with suppress(ImportError):  # without Blender's module there is nothing to write to

@@ -67,7 +67,7 @@ def pairs(chosen: argparse.Namespace) -> str:
     for case in chosen.cases:
         yardstick = run(case, "yardstick")["yardstick"] if case in LIMITS else None
         for engine in chosen.engines:
-            found = run(case, engine, chosen.frames)
+            found = run(case, engine, chosen.frames, "one")
             cells = [case.replace(":", " "), engine, *_stage_cells(found), f"{found['cold']:.1f}"]
             if yardstick:
                 share, limit = found["cold"] / yardstick, LIMITS[case][engine]

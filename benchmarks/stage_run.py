@@ -39,7 +39,10 @@ _REPEATS = 15
 def main(arguments: list[str]) -> None:
     """Print one JSON object."""
     case, engine = arguments[:2]
-    found = yardstick(case) if engine == "yardstick" else stages(case, engine, int(arguments[2]), arguments[3:] == ["one"])
+    if engine == "yardstick":
+        found = yardstick(case)
+    else:
+        found = stages(case, engine, int(arguments[2]), arguments[3:] == ["one"])
     usage = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
     found |= {"peak_mb": usage[0].ru_maxrss / 1024.0, "peak_child_mb": usage[1].ru_maxrss / 1024.0}
     found |= {"cpu": sum(part.ru_utime + part.ru_stime for part in usage)}

@@ -47,7 +47,7 @@ def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
     steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
     moments = [(step / steps, None) for step in range(1, steps)]
     # The shapes on the way only lead the map; they need not have settled.
-    shapes = [shape for few in batches(moments) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]
+    shapes = [shape for few in batches(moments, path.shapes_at_once) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]
     return [*shapes, key1]
 
 

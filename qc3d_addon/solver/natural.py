@@ -119,7 +119,8 @@ class NaturalFrames:
         positions: list[Floats] = []
         excess: list[int] = []
         yield 0.0
-        for maps, shapes, crossing in in_threads(self._first_try, batches(times.tolist())):
+        few = batches(times.tolist(), self._surface.shapes_at_once)
+        for maps, shapes, crossing in in_threads(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
@@ -166,7 +167,8 @@ class NaturalFrames:
         ]
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
-        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), batches(moments))))
+        few = batches(moments, surface.shapes_at_once)
+        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
 
     def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
         """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""

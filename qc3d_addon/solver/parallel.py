@@ -15,8 +15,6 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# So many shapes are solved for together: more save little, and wait for each other.
-_BATCH = 4
 # Beyond this the interpreter's lock and the memory's bandwidth leave nothing to gain.
 _MOST_THREADS = 4
 
@@ -39,9 +37,9 @@ def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
     pool.shutdown()
 
 
-def batches(items: Sequence[Item]) -> list[Sequence[Item]]:
-    """Items a few at a time, but no fewer batches than threads."""
-    size = max(1, min(_BATCH, -(-len(items) // thread_count())))
+def batches(items: Sequence[Item], most: int) -> list[Sequence[Item]]:
+    """Items a few at a time, ``most`` at most, but no fewer batches than threads."""
+    size = max(1, min(most, -(-len(items) // thread_count())))
     return [items[start : start + size] for start in range(0, len(items), size)]
 
 

@@ -33,6 +33,9 @@ from .topology import among, face_adjacency, sides, unique_edges, vertex_compone
 
 ANCHOR_WEIGHT = 0.05
 SWEEPS = 13
+# More shapes together save little and wait for each other; more triangles go through memory too often.
+_MOST_AT_ONCE = 4
+_TRIANGLES_AT_ONCE = 150_000
 _LEAST_VOLUME = 1e-12
 
 
@@ -133,6 +136,11 @@ class SurfacePath:
             (before.growth, after.growth),
         )
         return corrected
+
+    @property
+    def shapes_at_once(self) -> int:
+        """For how many times it pays to solve together: a few where that spares calls and passes of the factors."""
+        return max(1, min(_MOST_AT_ONCE, _TRIANGLES_AT_ONCE // max(1, len(self._surface.rows))))
 
     @property
     def inside_out(self) -> int:

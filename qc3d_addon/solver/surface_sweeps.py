@@ -29,7 +29,7 @@ _LARGEST_VOLUME_STEP = 0.1
 _LAST_VOLUME_STEPS = 12
 _VOLUME_TOLERANCE = 1e-12
 # Arrays of so many triangles, a dozen at a time, fit into the cache of one core.
-_TRIANGLES_AT_ONCE = 30_000
+_TRIANGLES_IN_CACHE = 30_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class Sweeps:
     def _operators(self) -> list[_Operator]:
         """Gradients multiplied by the wanted stretches, for as many shapes at once as the processor's cache holds."""
         surface, shapes = self._surface, len(self._wanted)
-        size = max(1, _TRIANGLES_AT_ONCE // max(1, len(surface.rows)))
+        size = max(1, _TRIANGLES_IN_CACHE // max(1, len(surface.rows)))
         return [
             _Operator.of(surface, slice(first, first + size), self._stretch[first : first + size])
             for first in range(0, shapes, size)

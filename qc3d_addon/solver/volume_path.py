@@ -20,6 +20,8 @@ from .stiffness import StiffnessPattern, stiffness_elements
 from .stretch import Stretch, StretchLaw
 from .tetmesh import Floats, Ints, TetMesh
 
+_MAPS_AT_ONCE = 4
+
 
 class VolumePath:
     """Maps between the identity and a fitted map by interpolated rotations and stretches.
@@ -85,5 +87,5 @@ class VolumePath:
     @cached_property
     def _missed(self) -> Floats:
         """(K + 1, N, 3): the fitted maps minus this path."""
-        times = np.linspace(0.0, 1.0, len(self._maps))
-        return np.asarray(self._maps - np.concatenate(list(in_threads(self.maps_at, batches(times.tolist())))))
+        times = batches(np.linspace(0.0, 1.0, len(self._maps)).tolist(), _MAPS_AT_ONCE)
+        return np.asarray(self._maps - np.concatenate(list(in_threads(self.maps_at, times))))

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import count, islice
+from threading import Event
 
 import pytest
 
-from qc3d_addon.solver.parallel import in_threads, thread_count
+from qc3d_addon.solver.parallel import batches, beside, in_threads, thread_count
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
@@ -40,3 +41,29 @@ def test_an_error_is_raised_in_its_turn() -> None:
     assert next(results) == 1.0
     with pytest.raises(ZeroDivisionError):
         next(results)
+
+
+def test_batches_hold_everything_in_order_and_keep_all_threads_busy() -> None:
+    for amount in range(20):
+        parts = batches(range(amount), 4)
+        assert [item for part in parts for item in part] == list(range(amount))
+        assert max(map(len, parts), default=0) <= 4
+        assert len(parts) >= min(amount, thread_count())
+
+
+def test_what_goes_on_beside_ends_with_its_result_or_its_error() -> None:
+    with beside(lambda: 3) as job:
+        pass
+    assert job.done()
+    assert job.result() == 3
+    with beside(lambda: 1 / 0) as job:
+        pass
+    with pytest.raises(ZeroDivisionError):
+        job.result()
+
+
+def test_after_an_error_nobody_waits_for_what_goes_on_beside() -> None:
+    never = Event()
+    with pytest.raises(KeyError), beside(never.wait):
+        raise KeyError
+    never.set()

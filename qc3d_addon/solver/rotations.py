@@ -10,6 +10,7 @@ from .tetmesh import Floats
 
 _NEWTON_STEPS = 20
 _SMALL_ANGLE = 1e-4
+_NO_ANGLE = 1e-12  # below this the axis is lost to rounding
 
 
 def by_component(matrices: Floats) -> Floats:
@@ -143,7 +144,7 @@ def nearest_branch(vectors: Floats, references: Floats) -> Floats:
     angle = np.linalg.norm(vectors, axis=1)
     reference_angle = np.linalg.norm(references, axis=1)
     axis = np.where(
-        (angle > 1e-9)[:, None],
+        (angle > _NO_ANGLE)[:, None],
         vectors / np.maximum(angle, 1e-300)[:, None],
         references / np.maximum(reference_angle, 1e-300)[:, None],
     )

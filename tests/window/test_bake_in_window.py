@@ -47,6 +47,8 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
     # What a computer draws in a second is its own affair; drawing must not wait for the bake.
     assert rates[1] > 0.2 * rates[0]
 
+    # So slow that the bar can be looked at twice.
+    window.ask("arm().qc3d.quality, arm().qc3d.count = 'finest', 400")
     child = start(window)
     widths = []
     for fraction in (0.2, 0.6):
@@ -56,6 +58,7 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
     assert 0 < widths[0] < widths[1]
     window.press("Escape")
     window.wait_for("job() is None")
+    window.ask(f"arm().qc3d.quality, arm().qc3d.count = 'normal', {len(MADE)}")
 
 
 def test_the_button_cannot_be_pressed_before_the_keys_are_chosen(window: Window) -> None:

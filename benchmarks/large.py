@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Memory and time of bakes of large meshes: python -m benchmarks.large [VERTICES ...] (Linux).
+"""Memory and time of bakes of large meshes (Linux).
+
+    python -m benchmarks.large [VERTICES ...] [--engine ENGINE] [--quality QUALITY] [--frames FRAMES]
 
 The bodies of the data folder, each triangle divided into smaller ones until there are about so many vertices. The bake
 runs as Blender runs it, in a child process; memory is the largest sum, over this process's children and theirs, of
@@ -9,6 +11,7 @@ what each has for itself and its share of the rest.
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import threading
@@ -29,18 +32,23 @@ from .catalogue import DATA
 
 SIZES = (6_890, 27_554, 110_210, 440_834)
 KEYS = ("rest", "arms_overhead")
-FRAMES = 5
 _PAUSE = 0.05
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print the table."""
-    settings = Settings(engine=os.environ.get("QC3D_ENGINE", "auto"))  # type: ignore[arg-type]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("vertices", nargs="*", type=int, default=SIZES)
+    parser.add_argument("--engine", default="tetwild")
+    parser.add_argument("--quality", default="normal")
+    parser.add_argument("--frames", type=int, default=5, help="in-betweens (default: 5)")
+    chosen = parser.parse_args()
+    settings = Settings(engine=chosen.engine, quality=chosen.quality)
     print("| vertices | engine | s | MB | seconds by stage |")
     print("|---|---|---|---|---|")
-    for wanted in map(int, arguments or map(str, SIZES)):
+    for wanted in chosen.vertices:
         pair = divided(read_pairs(DATA / "body.npz", KEYS)[0], wanted)
-        task = Task({KEYS: pair}, KEYS, settings, evenly_spaced(FRAMES))
+        task = Task({KEYS: pair}, KEYS, settings, evenly_spaced(chosen.frames))
         started = clock.perf_counter()
         with PeakMemory() as peak:
             bake = client.run(task, peak.note).bake
@@ -117,4 +125,4 @@ def _megabytes(process: int) -> float:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

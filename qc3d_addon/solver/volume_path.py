@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -43,7 +42,6 @@ class VolumePath:
 
     def __init__(self, mesh: TetMesh, maps: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
         self._mesh = mesh
-        self._maps = maps
         self._turning = turning
         self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(maps[-1])).stretch)
         self._law = law
@@ -60,6 +58,9 @@ class VolumePath:
 
         # For each coordinate the vertices that are free to move along it, the factors, and the load of the others.
         self._systems = list(in_threads(system, range(3)))
+        # (K + 1, N, 3): the fitted maps minus this path.
+        times = batches(np.linspace(0.0, 1.0, len(maps)).tolist(), _MAPS_AT_ONCE)
+        self._missed = maps - np.concatenate(list(in_threads(self.maps_at, times)))
 
     def at(self, time: float) -> Floats:
         """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
@@ -79,13 +80,7 @@ class VolumePath:
 
     def followed(self, time: float, values: Floats) -> Floats:
         """(N, 3): ``values`` at ``time`` with what this path misses of the nearest fitted maps, before and after."""
-        steps = len(self._maps) - 1
+        steps = len(self._missed) - 1
         before = min(int(time * steps), steps - 1)
         part = time * steps - before
         return np.asarray(values + (1.0 - part) * self._missed[before] + part * self._missed[before + 1])
-
-    @cached_property
-    def _missed(self) -> Floats:
-        """(K + 1, N, 3): the fitted maps minus this path."""
-        times = batches(np.linspace(0.0, 1.0, len(self._maps)).tolist(), _MAPS_AT_ONCE)
-        return np.asarray(self._maps - np.concatenate(list(in_threads(self.maps_at, times))))

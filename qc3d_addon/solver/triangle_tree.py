@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ _CHUNK = 2_000_000
 _MOST_AROUND_A_VERTEX = 64
 
 Pairs = tuple[Ints, Ints]
+Values = TypeVar("Values", Floats, Bools)
 
 
 class TriangleTree:
@@ -97,12 +99,13 @@ def _both(pairs: Pairs, more: Pairs) -> Pairs:
     return np.concatenate([pairs[0], more[0]]), np.concatenate([pairs[1], more[1]])
 
 
-def _joined(values: np.ndarray, join: np.ufunc, neutral: float) -> np.ndarray:
+def _joined(values: Values, join: np.ufunc, neutral: float) -> Values:
     """Values (..., count) of a level joined two by two into those of the level above."""
     count = values.shape[-1]
     if count % 2:
         values = np.concatenate([values, np.full((*values.shape[:-1], 1), neutral, values.dtype)], axis=-1)
-    return np.asarray(join(values[..., 0::2], values[..., 1::2]))
+    joined: Values = join(values[..., 0::2], values[..., 1::2])
+    return joined
 
 
 def _children(pairs: Pairs, count: int) -> Pairs:

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array, diags_array
 
 from .enclosed import ClosedComponents, MovingVolumes
 from .factorization import dissection_order, factored
+from .rotations import by_component
 from .stiffness import StiffnessPattern, stiffness_elements
 from .surface import TriangleDeformation, gradient_operator
 from .tetmesh import Bools, Floats, Ints
@@ -59,7 +60,7 @@ class MovingSurface:
         self.springs: Ints = np.flatnonzero(free[springs].any(axis=1))
         faces, edges = deformation.faces[self.rows], springs[self.springs]
         self.weights = deformation.weights[self.rows]
-        self.hats = deformation.gradients[self.rows]
+        self.hats = by_component(deformation.gradients[self.rows])
         spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(edges), 2, 2))
         stiffness = csr_array(
             StiffnessPattern(faces, count).assemble(stiffness_elements(self.weights, self.hats))

@@ -74,13 +74,13 @@ class _Operator(NamedTuple):
     @classmethod
     def of(cls, surface: MovingSurface, shapes: slice, stretch: Floats) -> _Operator:
         """Of a surface and the stretches (q, m, 2, 2) of the shapes."""
-        values = np.einsum("mcb,qmbd->qdmc", surface.hats, stretch, order="C")
-        first = len(surface.used) * np.arange(len(stretch))[:, None, None, None]
-        columns = np.broadcast_to(surface.faces + first, values.shape)
-        gradient = csr_array(
-            (values.ravel(), columns.ravel(), np.arange(0, values.size + 1, 3)),
-            shape=(values.size // 3, len(stretch) * len(surface.used)),
-        )
+        values = np.ascontiguousarray(np.einsum("mcb,qmbd->qdcm", surface.hats, stretch).transpose(0, 1, 3, 2))
+        # The pattern is that of one shape, again and again.
+        one = surface.gradient
+        columns = one.indices + np.arange(len(stretch), dtype=one.indices.dtype)[:, None] * one.shape[1]
+        starts = np.arange(0, values.size + 1, 3, dtype=one.indices.dtype)
+        shape = (len(stretch) * one.shape[0], len(stretch) * one.shape[1])
+        gradient = csr_array((values.ravel(), columns.ravel(), starts), shape=shape)
         return cls(shapes, gradient, gradient.T)
 
 

@@ -74,7 +74,8 @@ class _Operator(NamedTuple):
     @classmethod
     def of(cls, surface: MovingSurface, shapes: slice, stretch: Floats) -> _Operator:
         """Of a surface and the stretches (q, m, 2, 2) of the shapes."""
-        values = np.ascontiguousarray(np.einsum("mcb,qmbd->qdcm", surface.hats, stretch).transpose(0, 1, 3, 2))
+        # One by one: sums of products over several shapes would be rounded by how many there are.
+        values = np.stack([np.einsum("mcb,mbd->dcm", surface.hats, part).transpose(0, 2, 1) for part in stretch])
         # The pattern is that of one shape, again and again.
         one = surface.gradient
         columns = one.indices + np.arange(len(stretch), dtype=one.indices.dtype)[:, None] * one.shape[1]

@@ -91,6 +91,7 @@ def test_a_kept_map_serves_another_number_of_frames() -> None:
     found = finish(carry_out(denser)).bake
     assert found is not None
     assert first.bake is not None
-    np.testing.assert_array_equal(found.frames[::2], first.bake.frames)
+    # To rounding: frames are solved a few together.
+    np.testing.assert_allclose(found.frames[::2], first.bake.frames, rtol=0.0, atol=1e-12)
     mesh = from_bytes(first.maps[KEYS], denser.pairs[KEYS]).mesh
     assert len(mesh.tets) > 100

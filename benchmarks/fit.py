@@ -23,11 +23,11 @@ from qc3d_addon.solver.embedding import Embedding
 from qc3d_addon.solver.foldfree import FoldFreeFitter
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.location import interpolation_matrix
+from qc3d_addon.solver.progress import finish
 from qc3d_addon.solver.sampling import Resolution
 from qc3d_addon.solver.surface_path import SurfacePath
 
 from . import stage_cases
-from .catalogue import Floats
 from .report import table
 
 _SPACINGS = (0.03, 0.02, 0.014, 0.01, 0.007)  # the first three are those of the qualities
@@ -48,22 +48,14 @@ def main() -> None:
             products: list[int] = []
             with patch.object(foldfree, "cg", _counting(cg, products)):
                 started = clock.perf_counter()
-                values = _followed(FoldFreeFitter(mesh, landmarks, embedding.weights), targets)
+                fitter = FoldFreeFitter(mesh, landmarks, embedding.weights)
+                values = finish(follow_path(fitter, targets)).maps[-1]
                 seconds = clock.perf_counter() - started
             missed = np.sqrt(embedding.weights @ ((landmarks @ values - embedding.key1) ** 2).sum(axis=1))
             cells = [case.replace(":", " "), f"{len(mesh.tets):,}", f"{seconds:.2f}", str(len(products))]
             rows.append([*cells, f"{np.mean(products):.0f}", str(max(products)), f"{missed:.1e}"])
     head = ["pair", "tetrahedra", "s", "Newton steps", "products a step", "at most", "residual"]
     print(table(head, rows))
-
-
-def _followed(fitter: FoldFreeFitter, targets: list[Floats]) -> Floats:
-    steps = follow_path(fitter, targets)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return np.asarray(end.value.maps[-1])
 
 
 def _counting(solve: Callable[..., Any], products: list[int]) -> Callable[..., Any]:

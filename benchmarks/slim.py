@@ -24,6 +24,7 @@ from qc3d_addon.solver.foldfree import FoldFreeFitter
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.location import interpolation_matrix
 from qc3d_addon.solver.meshing import fill_cube
+from qc3d_addon.solver.progress import finish
 from qc3d_addon.solver.rotations import determinants
 from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.stiffness import StiffnessPattern, stiffness_elements
@@ -64,12 +65,7 @@ class Problem:
     def fitted(self) -> Floats:
         """Our fit to the last target by way of the others, as a bake does it."""
         fitter = FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
-        steps = follow_path(fitter, self.targets)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as stop:
-                return np.asarray(stop.value.maps[-1])
+        return np.asarray(finish(follow_path(fitter, self.targets)).maps[-1])
 
     def fitted_by_slim(self, goal: float) -> tuple[Floats, int]:
         """SLIM's map by the same way, and how many iterations it took; ends when the last target is missed by goal."""

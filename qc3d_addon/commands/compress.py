@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
 from ..solver import frame_compression
-from ..solver.array_files import open_archive, read_array, replacing
+from ..solver.array_files import open_archive, read_array, replacing, replacing_all
 from ..solver.compressed_files import Packer, Source, read_compressed, write_compressed
 from ..solver.compression import Boundary, Codec, Scheme
 from ..solver.conditions import Conditions
@@ -70,16 +69,15 @@ def _compress(arguments: argparse.Namespace) -> None:
         raise InputError(f"The error {arguments.error} is not possible; give a number above 0.")
     if arguments.report is not None and arguments.report.resolve() == arguments.output.resolve():
         raise InputError(f"{arguments.report} is named twice; output and report must be different files.")
-    with ExitStack() as stack:
-        # Whether the places can be written is known before the work.
-        output = stack.enter_context(replacing(arguments.output))
-        report_file = None if arguments.report is None else stack.enter_context(replacing(arguments.report))
+    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    # Whether the places can be written is known before the work.
+    with replacing_all(*files) as (output, *report_files):
         job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
         choice = _chosen(job.compressor, arguments)
         data = job.packer.bytes_of(choice.compressed)
         report = _report(job.compressor, choice, len(data))
         write_compressed(output, data)
-        if report_file is not None:
+        for report_file in report_files:
             report_file.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(
         f"{len(data)} bytes, 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from .rotations import determinants
-from .surface import cross_product, gradient_operator, hat_gradients, tangent_bases
+from .stiffness import gradient_operator
+from .surface import cross_product, hat_gradients, tangent_bases
 from .tetmesh import Floats, Ints
 
 # Triangles whose area is below this part of their squared edges have no directions in floating point.

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import csr_array, diags_array
 
 from .distortion import TriangleStretches, approximate_singular_values, dilatation, extreme_stretch, volume_ratio
 from .keypair import KeyPair
@@ -138,10 +138,7 @@ class _LandmarkAverages:
 
     def __init__(self, prepared: PreparedMap) -> None:
         mesh = prepared.mesh
-        weights = np.repeat(mesh.volumes * prepared.insideness, 4)
-        owners = np.repeat(np.arange(len(mesh.tets)), 4)
-        shape = (len(mesh.points), len(mesh.tets))
-        self._around = coo_array((weights, (mesh.tets.ravel(), owners)), shape=shape).tocsr()
+        self._around = csr_array(mesh.incidence @ diags_array(mesh.volumes * prepared.insideness))
         totals = prepared.landmarks @ self._around.sum(axis=1)
         self._landmarks = csr_array(diags_array(1.0 / totals) @ prepared.landmarks)
 

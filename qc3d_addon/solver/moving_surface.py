@@ -15,8 +15,8 @@ from scipy.sparse import csr_array, diags_array
 from .enclosed import ClosedComponents, MovingVolumes
 from .factorization import dissection_order, factored
 from .rotations import by_component
-from .stiffness import StiffnessPattern, stiffness_elements
-from .surface import TriangleDeformation, gradient_operator
+from .stiffness import StiffnessPattern, gradient_operator, stiffness_elements
+from .surface import TriangleDeformation
 from .tetmesh import Bools, Floats, Ints
 from .topology import distinct
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import NamedTuple, TypeVar
 
 T = TypeVar("T")
+Step = TypeVar("Step")
 
 STAGES = ("mesh", "locate", "fit", "factor", "frames")
 
@@ -24,7 +25,7 @@ class Progress(NamedTuple):
 Steps = Generator[Progress, None, T]
 
 
-def finish(steps: Steps[T], on_progress: Callable[[Progress], None] | None = None) -> T:
+def finish(steps: Generator[Step, None, T], on_progress: Callable[[Step], None] | None = None) -> T:
     """Run steps to their end and return what they return."""
     while True:
         try:

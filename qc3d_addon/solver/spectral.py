@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from .errors import InputError
@@ -66,10 +66,8 @@ class Transfer:
     def to_vertices(self) -> csr_array:
         """(N, M) mean over the tetrahedra around each vertex, weighted by volume."""
         mesh = self._mesh
-        count = len(mesh.tets)
-        weights = np.repeat(mesh.volumes / 4.0, 4)
-        sums = coo_array((weights, (mesh.tets.ravel(), np.repeat(np.arange(count), 4))), (len(mesh.points), count))
-        return csr_array(diags_array(1.0 / np.maximum(self.vertex_volumes, 1e-300)) @ sums)
+        shares = mesh.incidence @ diags_array(mesh.volumes / 4.0)
+        return csr_array(diags_array(1.0 / np.maximum(self.vertex_volumes, 1e-300)) @ shares)
 
     @cached_property
     def to_tets(self) -> csr_array:

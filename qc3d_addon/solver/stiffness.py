@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sparsity pattern of a simplicial mesh, built once; matrices are scattered into it afterwards."""
+"""The sparsity pattern of a simplicial mesh, built once, matrices scattered into it, and its gradient operator."""
 
 from __future__ import annotations
 
@@ -50,6 +50,25 @@ class StiffnessPattern:
         order = np.argsort(self._slots, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(self._slots, minlength=len(self._columns)))])
         return csr_array((np.ones(len(order)), order, starts), shape=(len(self._columns), len(order)))
+
+
+def gradient_operator(elements: Ints, gradients: Floats, count: int) -> csr_array:
+    """(d m, count): takes values (count,) to their derivatives in the first direction on all elements, then the next.
+
+    Parameters
+    ----------
+    elements : (m, k) int64
+    gradients : (m, k, d)
+        Of the hat functions.
+    count : int
+        How many vertices there are.
+    """
+    directions = gradients.shape[2]
+    columns = np.tile(elements, (directions, 1)).ravel()
+    starts = np.arange(0, len(columns) + 1, elements.shape[1])
+    return csr_array(
+        (gradients.transpose(2, 0, 1).ravel(), columns, starts), shape=(directions * len(elements), count)
+    )
 
 
 def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats | None = None) -> Floats:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from .rotations import products, rotation_vectors
 from .stretch import Stretch
@@ -84,22 +83,6 @@ def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
     return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
-
-
-def gradient_operator(faces: Ints, gradients: Floats, count: int) -> csr_array:
-    """(2m, count): takes coordinates (count,) to their gradients along the first, then the second tangents.
-
-    Parameters
-    ----------
-    faces : (m, 3)
-    gradients : (m, 3, 2)
-        Of the hat functions.
-    count : int
-        How many vertices there are.
-    """
-    columns = np.concatenate([faces, faces]).ravel()
-    values = gradients.transpose(2, 0, 1).ravel()
-    return csr_array((values, columns, np.arange(0, 6 * len(faces) + 1, 3)), shape=(2 * len(faces), count))
 
 
 def tangents_of(rotations: Floats, tangents: Floats) -> Floats:

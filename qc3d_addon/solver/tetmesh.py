@@ -95,13 +95,18 @@ class TetMesh:
     def gradient_operator(self) -> csr_array:
         """(3M, N): takes a coordinate of a map (N,) to its derivatives along x on all tetrahedra, then y, then z."""
         # The types of this module are wanted where scipy must not be loaded yet.
-        from scipy.sparse import csr_array
+        from .stiffness import gradient_operator
 
-        starts = np.arange(0, 12 * len(self.tets) + 1, 4)
-        columns = np.concatenate([self.tets] * 3).ravel()
-        return csr_array(
-            (self.gradients.transpose(2, 0, 1).ravel(), columns, starts), shape=(3 * len(self.tets), len(self.points))
-        )
+        return gradient_operator(self.tets, self.gradients, len(self.points))
+
+    @cached_property
+    def incidence(self) -> csr_array:
+        """(N, M): 1 where a vertex is a corner of a tetrahedron."""
+        from scipy.sparse import coo_array
+
+        owners = np.repeat(np.arange(len(self.tets)), 4)
+        shape = (len(self.points), len(self.tets))
+        return coo_array((np.ones(len(owners)), (self.tets.ravel(), owners)), shape=shape).tocsr()
 
     def jacobians(self, values: Floats) -> Floats:
         """(M, 3, 3) Jacobians, stored by component, of the map that sends ``points`` to ``values`` (N, 3)."""

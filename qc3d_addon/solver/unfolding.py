@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
 
 from .rotations import determinants
 from .tetmesh import Floats, TetMesh
@@ -25,9 +24,7 @@ def covered(mesh: TetMesh, values: Floats, other: Floats) -> Floats | None:
     other : (N, 3)
         A map near it without folds.
     """
-    owners = np.repeat(np.arange(len(mesh.tets)), 4)
-    shape = (len(mesh.points), len(mesh.tets))
-    around = coo_array((np.ones(len(owners)), (mesh.tets.ravel(), owners)), shape=shape).tocsr()
+    around = mesh.incidence
     share = np.zeros(len(mesh.points))
     found = values
     for _ in range(_ROUNDS):

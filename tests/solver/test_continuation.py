@@ -11,6 +11,7 @@ from qc3d_addon.solver.embedding import Embedding
 from qc3d_addon.solver.foldfree import FoldFreeFitter
 from qc3d_addon.solver.keypair import KeyPair
 from qc3d_addon.solver.location import interpolation_matrix
+from qc3d_addon.solver.progress import finish
 from qc3d_addon.solver.representation import polar_decomposition
 from qc3d_addon.solver.rotations import determinants, rotation_matrices
 from qc3d_addon.solver.surface_path import SurfacePath
@@ -26,13 +27,8 @@ def followed(key1: Floats) -> tuple[Embedding, FoldFreeFitter, FollowedPath, lis
     mesh = jittered_grid(8, seed=1)
     fitter = FoldFreeFitter(mesh, interpolation_matrix(mesh, embedding.key0), embedding.weights)
     path = SurfacePath(embedding)
-    steps = follow_path(fitter, path_to(path, embedding.key1))
     done: list[float] = []
-    while True:
-        try:
-            done.append(next(steps))
-        except StopIteration as stop:
-            return embedding, fitter, stop.value, done
+    return embedding, fitter, finish(follow_path(fitter, path_to(path, embedding.key1)), done.append), done
 
 
 def test_a_bar_twisted_by_more_than_half_a_turn() -> None:

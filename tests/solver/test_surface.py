@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from qc3d_addon.solver.rotations import rotation_matrices
+from qc3d_addon.solver.stiffness import gradient_operator
 from qc3d_addon.solver.stretch import StretchLaw
 from qc3d_addon.solver.surface import (
     TriangleDeformation,
     closest_tangents,
     face_normals,
-    gradient_operator,
     hat_gradients,
     stretched,
     tangent_bases,

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .crossings import crossing_pairs
+from .crossings import CrossingSearch
 from .errors import InputError
 from .keypair import KeyPair
 from .surface_distance import SurfaceDistance
 from .tetmesh import Bools, Floats, Ints
 from .topology import sides
+from .triangle_tree import CrowdedError
 
 # A vertex keeps at most this part of the mesh's mean edge from a collider, however far its keys are from it: enough for
 # the flat triangles between vertices.
@@ -99,18 +100,32 @@ class Obstacle:
         """Distances from the collider in a frame."""
         return self._distances(self._frames[index])
 
-    def crossings(self, index: int, positions: Floats, faces: Ints) -> int:
-        """Pairs of triangles, one of a mesh (n, 3) and one of the collider, that cross in a frame."""
+    def crossings(self, index: int, positions: Floats, faces: Ints) -> int | None:
+        """Pairs of triangles, one of a mesh (n, 3) and one of the collider, that cross in a frame.
+
+        None where so many lie over each other that the search is given up.
+        """
         together = np.concatenate([positions, self._frames[index]])
-        pairs = crossing_pairs(together, np.concatenate([faces, self._collider.faces + len(positions)]))
-        return int(np.count_nonzero((pairs < len(faces)).sum(axis=1) == 1))
+        triangles = np.concatenate([faces, self._collider.faces + len(positions)])
+        owners = np.repeat([0, 1], [len(faces), len(self._collider.faces)])
+        try:
+            return len(CrossingSearch(triangles, [together], groups=owners).pairs(together))
+        except CrowdedError:
+            return None
 
     def report(self, frames: Floats, faces: Ints, notes: list[str]) -> dict[str, Any]:
-        """``collider_crossings`` of the frames (k, n, 3), and the notes with a sentence where there are any."""
+        """``collider_crossings`` of the frames (k, n, 3), and the notes with sentences where there are any."""
         counts = [self.crossings(index, frame, faces) for index, frame in enumerate(frames)]
-        if any(counts):
-            worst = int(np.argmax(counts))
-            notes = [*notes, f"Frame {worst} crosses the colliders in {counts[worst]} pairs of triangles."]
+        known = [count or 0 for count in counts]
+        notes = list(notes)
+        if any(known):
+            worst = int(np.argmax(known))
+            notes.append(f"Frame {worst} crosses the colliders in {known[worst]} pairs of triangles.")
+        if None in counts:
+            notes.append(
+                f"Whether the mesh crosses the colliders is not known in {counts.count(None)} of {len(counts)} frames: "
+                "so many triangles lie over each other there that looking would take too long. Use simpler colliders."
+            )
         return {"collider_crossings": counts, "notes": notes}
 
     def _distances(self, shape: Floats) -> SurfaceDistance:

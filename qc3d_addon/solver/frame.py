@@ -32,8 +32,8 @@ class Frame:
         Tetrahedra that are not kept positively oriented.
     repaired : bool
         Whether folds of the predicted map had to be removed.
-    crossings : int
-        Pairs of triangles that cross beyond what the worse of the two keys has.
+    crossings : int or None
+        Pairs of triangles that cross beyond what the worse of the two keys has; None where the search was given up.
     """
 
     positions: Floats
@@ -42,11 +42,17 @@ class Frame:
     place: Floats
     folds: int
     repaired: bool
-    crossings: int
+    crossings: int | None
 
     @classmethod
     def of(
-        cls, prepared: PreparedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int
+        cls,
+        prepared: PreparedMap,
+        positions: Floats,
+        values: Floats,
+        time: float,
+        repaired: bool,
+        crossings: int | None,
     ) -> Frame:
         """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube."""
         determinant = determinants(prepared.mesh.jacobians(values))

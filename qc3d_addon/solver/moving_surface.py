@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from .enclosed import ClosedComponents, MovingVolumes
-from .factorization import dissection_order, factored
+from .factorization import elimination_order, factored
 from .rotations import by_component
 from .stiffness import StiffnessPattern, gradient_operator, stiffness_elements
 from .surface import TriangleDeformation
@@ -67,7 +67,7 @@ class MovingSurface:
             + StiffnessPattern(edges, count).assemble(spring)
         )
         moving = np.flatnonzero(free)
-        moving = moving[dissection_order(points[moving], csr_array(stiffness[moving][:, moving]))]
+        moving = moving[elimination_order(points[moving], csr_array(stiffness[moving][:, moving]))]
         touched = closed.faces[free[closed.faces].any(axis=1)]
         beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
         beside = beside[~free[beside]]

@@ -43,9 +43,19 @@ def bake_report(
     }
 
 
-def crossing_notes(crossings: Sequence[int], times: Floats) -> list[str]:
-    """A sentence about the frame at ``times`` (k,) that crosses itself most beyond its keys, if one does."""
-    if not any(crossings):
-        return []
-    worst = int(np.argmax(crossings))
-    return [f"The frame at {times[worst]:.3g} crosses itself in {crossings[worst]} pairs of triangles more than a key."]
+def crossing_notes(crossings: Sequence[int | None], times: Floats) -> list[str]:
+    """Sentences about the frame at ``times`` (k,) that crosses itself most beyond its keys, and about those unknown."""
+    notes = []
+    counts = [count or 0 for count in crossings]
+    if any(counts):
+        worst = int(np.argmax(counts))
+        notes.append(
+            f"The frame at {times[worst]:.3g} crosses itself in {counts[worst]} pairs of triangles more than a key."
+        )
+    if None in crossings:
+        notes.append(
+            f"Whether the mesh crosses itself is not known in {crossings.count(None)} of {len(crossings)} frames: so "
+            "many triangles lie over each other there that looking would take too long. Remove triangles that are "
+            "there many times over."
+        )
+    return notes

@@ -85,8 +85,8 @@ class _Crossings:
         still = (pair.key0 == pair.key1).all(axis=1)
         self._limit = CrossingLimit(pair.faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
 
-    def excess(self, frame: Floats) -> int:
-        """Crossing pairs of triangles of a frame (n, 3) beyond what the keys have."""
+    def excess(self, frame: Floats) -> int | None:
+        """Crossing pairs of triangles of a frame (n, 3) beyond what the keys have; None where that is not known."""
         return self._limit.excess(self._scaled(frame))
 
     def _scaled(self, positions: Floats) -> Floats:

@@ -9,12 +9,14 @@ from scipy.spatial import cKDTree
 
 from .surface import face_normals
 from .tetmesh import Floats, Ints
+from .topology import without_piles
 
 # Triangles are found by the nearest of their samples: so many candidates for each point.
 _CANDIDATES = 12
 # Samples of a triangle are no farther apart than so many median edges of the mesh.
 _SPACING = 1.5
 _MOST_SAMPLES = 400_000
+_MOST_TOGETHER = 64  # samples in one place: of triangles that are there as often
 
 
 class SurfaceDistance:
@@ -32,8 +34,10 @@ class SurfaceDistance:
         faces = faces[np.linalg.norm(normals, axis=1) > 0.0]
         self._points, self._faces = points, faces
         self._normals = _vertex_normals(points, faces)
-        samples, self._owners = _samples(points, faces)
-        self._tree = cKDTree(samples)
+        samples, owners = _samples(points, faces)
+        kept = without_piles(samples, _MOST_TOGETHER)
+        self._owners = owners[kept]
+        self._tree = cKDTree(samples[kept])
 
     def nearest(self, queries: Floats) -> tuple[Floats, Floats, Floats]:
         """Where points (q, 3) are.

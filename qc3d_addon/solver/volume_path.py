@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
 from .branches import Turning
-from .factorization import dissection_order, factored
+from .factorization import elimination_order, factored
 from .parallel import batches, in_threads
 from .representation import polar_decomposition
 from .rotations import products
@@ -48,7 +48,7 @@ class VolumePath:
         self._weights = mesh.volumes * insideness
         elements = stiffness_elements(self._weights, mesh.gradients)
         matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(elements)
-        order = dissection_order(mesh.points, matrix)
+        order = elimination_order(mesh.points, matrix)
 
         def system(coordinate: int) -> tuple[Ints, SuperLU, Floats]:
             held = mesh.on_cube_face[:, coordinate]

@@ -31,7 +31,8 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     Raises
     ------
     InputError
-        If the second key is the first one mirrored or turned inside out, which no map without folds reaches.
+        If more than half of the second key is mirrored, turned inside out or crossed by itself, which no map without
+        folds reaches.
     MeshingError
         If the engine asked for cannot fill the cube.
 
@@ -40,7 +41,7 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
     both keys all the same.
     """
-    require_reachable(pair)
+    out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
     yield Progress("mesh", 0.0)
@@ -70,20 +71,21 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
         seconds,
         {settings.stretch: path},
     )
+    notes = []
     missed = prepared.landmark_residual()["rms"]
-    if path.inside_out:
-        note = (
-            f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
+    if out_of_reach.parts:
+        notes.append(
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys: no motion of a volume "
             "does that, and the mode straight may look no worse."
         )
     elif missed > _LARGE_RESIDUAL:
-        note = (
-            f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
-            "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
+        notes.append(
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds comes nearer to what the "
+            "second key crosses or flattens, and the mode straight may look no worse."
         )
-    else:
-        return prepared
-    return replace(prepared, notes=(*filled.notes, note))
+    if pair.far_away is not None:
+        notes.append(pair.far_away)
+    return replace(prepared, notes=(*filled.notes, *notes))
 
 
 def _way(embedding: Embedding, settings: Settings, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
@@ -93,5 +95,5 @@ def _way(embedding: Embedding, settings: Settings, seconds: dict[str, float]) ->
         return path, path_to(path, embedding.key1)
 
 
-def _closed_parts(count: int) -> str:
-    return "A closed part of the mesh is" if count == 1 else f"{count} closed parts of the mesh are"
+def _parts(count: int) -> str:
+    return "A part of the mesh is" if count == 1 else f"{count} parts of the mesh are"

@@ -68,7 +68,7 @@ def straight_inbetweens(pairs: Sequence[KeyPair], times: ArrayLike, settings: Se
         "certificates": [],
         "residual": None,
         "peak_memory_mb": peak_memory_mb(),
-        "notes": crossing_notes(crossings, wanted),
+        "notes": [*crossing_notes(crossings, wanted), *dict.fromkeys(pair.far_away for pair in pairs if pair.far_away)],
         "worst_stretch": worst_stretch(pairs, segments, frames),
         "key_error": 0.0,
         "seconds": {"frames": clock.perf_counter() - started},

@@ -4,10 +4,26 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 _LONGEST = 1000
+
+# What to do where the system refuses, by the number of its error; not every system has every one.
+_REMEDIES = {
+    "ENOSPC": "make room on that disk, or choose another one",
+    "EDQUOT": "make room within your quota, or choose another disk",
+    "EFBIG": "raise the limit on the size of files (ulimit -f), or choose another disk",
+    "ENAMETOOLONG": "choose a shorter name",
+    "EACCES": "choose another place, or ask for access to this one",
+    "EPERM": "choose another place, or ask for access to this one",
+    "EROFS": "choose another place",
+    "EMFILE": "close some files or programs, or raise the limit on open files (ulimit -n)",
+    "ENFILE": "close some files or programs, or raise the limit on open files (ulimit -n)",
+    "EAGAIN": "close some programs, or raise the limit on processes (ulimit -u)",
+    "ENOMEM": "close some programs, or use fewer frames, a lower quality or a smaller mesh",
+}
 
 
 class QC3DError(Exception):
@@ -51,3 +67,15 @@ def naming_pair(first: str, second: str, chain: Sequence[str]) -> Iterator[None]
         if len(chain) == 2:
             raise
         raise type(error)(f"From '{first}' to '{second}': {error}") from error
+
+
+def reason(error: BaseException) -> str:
+    """What went wrong as a clause: the system's own words where there are some, on one line, without a full stop."""
+    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return " ".join(text.split()).rstrip(".") or type(error).__name__
+
+
+def with_remedy(error: OSError) -> str:
+    """As ``reason``, and what to do about it, where that follows from the kind of the error."""
+    remedies = [text for name, text in _REMEDIES.items() if getattr(errno, name, None) == error.errno]
+    return "; ".join([reason(error), *remedies[:1]])

@@ -15,7 +15,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from .array_files import replacing, require_file, unreadable
+from .array_files import require_file, unreadable
+from .atomic_files import replacing
 from .errors import InputError
 from .settings import OF_THE_FIT, Settings
 
@@ -53,12 +54,9 @@ def write_maps(path: Path, kept: KeptMaps) -> None:
     }
     text = json.dumps(header).encode()
     with replacing(path) as unfinished:
-        try:
-            unfinished.write_bytes(
-                b"".join([_FIXED.pack(_MAGIC, _VERSION, len(text)), text, *(kept.maps[pair] for pair in ends)])
-            )
-        except OSError as error:
-            raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
+        unfinished.write_bytes(
+            b"".join([_FIXED.pack(_MAGIC, _VERSION, len(text)), text, *(kept.maps[pair] for pair in ends)])
+        )
 
 
 def read_maps(path: Path) -> KeptMaps:

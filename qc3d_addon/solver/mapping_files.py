@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .array_files import open_archive, read_array, replacing, require_file
+from .array_files import open_archive, read_array, require_file, write_arrays
+from .atomic_files import replacing
 from .errors import InputError
 from .mapping import Mapping, checked_mesh
 from .tetmesh import TetMesh
@@ -112,7 +113,7 @@ def read_tets(path: Path) -> TetFile:
 
 
 def write_tets(path: Path, content: TetFile) -> None:
-    """Write a mesh with its values; the format follows the ending.
+    """Write a mesh with its values, whole or not at all; the format follows the ending.
 
     Formats without values, such as .mesh, get the mesh with its vertices at their images.
 
@@ -122,23 +123,32 @@ def write_tets(path: Path, content: TetFile) -> None:
         If the file cannot be written, or the ending is unknown.
     """
     with replacing(path) as unfinished:
-        if path.suffix.lower() == ".npz":
-            try:
-                with unfinished.open("wb") as file:
-                    arrays: dict[str, Any] = {**content.at_vertices, **content.at_tets}
-                    np.savez_compressed(file, points=content.points, tets=content.tets, **arrays)
-            except OSError as error:
-                raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
-            return
-        meshio = _meshio()
-        if path.suffix.lower() in _BARE:
-            found = meshio.Mesh(content.at_vertices.get(TARGET, content.points), [("tetra", content.tets)])
-        else:
-            pad = _padded if _format(path) == "gmsh" else np.asarray
-            at_tets = {name: [pad(values)] for name, values in content.at_tets.items()}
-            found = meshio.Mesh(content.points, [("tetra", content.tets)], content.at_vertices, at_tets)
-        with _meshio_errors(path, "written"):
-            found.write(unfinished, _format(path))
+        put_tets(unfinished, content)
+
+
+def put_tets(path: Path, content: TetFile) -> None:
+    """As ``write_tets``, straight into a file.
+
+    Raises
+    ------
+    InputError
+        If the ending is unknown, or the format has no room for such values.
+    OSError
+        If the file cannot be written.
+    """
+    if path.suffix.lower() == ".npz":
+        arrays: dict[str, Any] = {**content.at_vertices, **content.at_tets}
+        write_arrays(path, points=content.points, tets=content.tets, **arrays)
+        return
+    meshio = _meshio()
+    if path.suffix.lower() in _BARE:
+        found = meshio.Mesh(content.at_vertices.get(TARGET, content.points), [("tetra", content.tets)])
+    else:
+        pad = _padded if _format(path) == "gmsh" else np.asarray
+        at_tets = {name: [pad(values)] for name, values in content.at_tets.items()}
+        found = meshio.Mesh(content.points, [("tetra", content.tets)], content.at_vertices, at_tets)
+    with _meshio_errors(path, "written"):
+        found.write(path, _format(path))
 
 
 def _format(path: Path) -> str | None:

@@ -1,30 +1,41 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Temporary folders of which nothing stays, not even where the process that made them was killed."""
+"""Folders that only this process uses: gone when it is done with them, swept by a later one where it was killed."""
 
 from __future__ import annotations
 
+import errno
 import os
+import re
+import secrets
 import shutil
 import stat
 import sys
 import tempfile
-import time as clock
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
 
-PREFIX = "qc3d-"
+PREFIX = ".qc3d-"
 _MARK = "in_use"
-_YOUNG = 60.0  # seconds in which a folder may still be in the making
+# What the first line of the mark says; only a folder with exactly this, its own name and its own number is ever swept.
+_SENTENCE = "QC3D removes this folder, and all that is in it, once the program that made it has ended."
+_BESIDE = re.compile(r"\.qc3d-[0-9a-f]{32}(\.\w{1,50})?")
+_LONGEST_MARK = 10_000  # bytes
 
 
 class PrivateFolder:
     """A new folder that only this user can read, removed by ``close``.
 
-    While it is in use a file in it is locked. The system frees the lock when the process ends, however that happens:
-    every new folder first removes those that nobody uses any more.
+    A file in it, the mark, is locked while the folder is in use and says whose it is. The system frees the lock when
+    the process ends, however that happens; every new folder first removes those beside it that nobody uses any more.
+
+    Parameters
+    ----------
+    parent : Path, optional
+        Where it is made; by default in the system's folder for temporary files.
 
     Attributes
     ----------
@@ -36,14 +47,17 @@ class PrivateFolder:
         If no folder can be made.
     """
 
-    def __init__(self) -> None:
-        remove_abandoned()
-        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+    def __init__(self, parent: Path | None = None) -> None:
+        parent = Path(tempfile.gettempdir() if parent is None else parent)
+        remove_abandoned(parent)
+        self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        self._mark: BinaryIO | None = None
         try:
-            self._mark = (self.path / _MARK).open("wb")
-            _lock(self._mark)
-        except OSError:
-            shutil.rmtree(self.path, ignore_errors=True)
+            self._mark = (self.path / _MARK).open("x+b", buffering=0)
+            _lock(self._mark)  # before it says whose it is: whoever finds it unlocked and ours may remove it
+            _write_whole(self._mark, "\n".join(_identity(self.path)))
+        except BaseException:
+            self.close()
             raise
 
     def __enter__(self) -> Path:
@@ -52,40 +66,107 @@ class PrivateFolder:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
+    def beside(self, suffix: str) -> Path:
+        """A name that nobody can guess for a file next to the folder, removed with it.
+
+        For files that have to be written in the place where they will stay. There is no such file yet.
+        """
+        assert self._mark is not None
+        name = f"{PREFIX}{secrets.token_hex(16)}{suffix}"
+        _write_whole(self._mark, name)
+        return self.path.with_name(name)
+
     def close(self) -> None:
         """Remove the folder and all in it; nothing happens the second time."""
-        self._mark.close()
-        shutil.rmtree(self.path, ignore_errors=True)
+        mark, self._mark = self._mark, None
+        remove(self.path, mark)
 
 
-def remove_abandoned() -> None:
-    """Remove folders of processes that ended without removing them; what cannot be removed stays."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        with suppress(OSError):
-            if _is_abandoned(folder):
-                shutil.rmtree(folder, ignore_errors=True)
+def remove(folder: Path, mark: BinaryIO | None = None) -> None:
+    """Remove a private folder, its mark last, so that a later sweep finds what could not be removed.
+
+    Parameters
+    ----------
+    folder : Path
+    mark : BinaryIO, optional
+        The open mark, which is closed; what it names beside the folder goes as well.
+    """
+    left = [path for path in _siblings(folder, mark) if not _remove(path)]
+    with suppress(OSError):
+        left += [path for path in folder.iterdir() if path.name != _MARK and not _remove(path)]
+    if mark is not None:
+        mark.close()
+    if not left:
+        _remove(folder)
 
 
-def _is_abandoned(folder: Path) -> bool:
-    found = folder.lstat()  # not what a symbolic link leads to
-    if not stat.S_ISDIR(found.st_mode) or (hasattr(os, "getuid") and found.st_uid != os.getuid()):
-        return False
-    if clock.time() - found.st_mtime < _YOUNG:
-        return False
-    mark = folder / _MARK
-    if not mark.exists():
-        return not any(folder.iterdir())
-    with mark.open("r+b") as file:
-        return _lock(file)
+def remove_abandoned(parent: Path) -> None:
+    """Remove private folders in ``parent`` whose processes ended without doing so; what cannot be removed stays."""
+    with suppress(OSError), os.scandir(parent) as entries:
+        found = [Path(entry.path) for entry in entries if entry.name.startswith(PREFIX)]
+        for folder in found:
+            with suppress(OSError):
+                _remove_if_abandoned(folder)
+
+
+def _remove_if_abandoned(folder: Path) -> None:
+    if not _is_ours(folder.lstat(), stat.S_ISDIR):  # not what a symbolic link leads to
+        return
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(folder / _MARK, flags), "r+b", buffering=0) as mark:
+        if not _is_ours(os.fstat(mark.fileno()), stat.S_ISREG):
+            return
+        # Only what is ours is locked: the process that makes a folder must get its lock.
+        if _lines(mark)[:3] == _identity(folder) and _lock(mark):
+            remove(folder, mark)
+
+
+def _is_ours(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
+    return is_kind(found.st_mode) and (not hasattr(os, "geteuid") or found.st_uid == os.geteuid())
+
+
+def _identity(folder: Path) -> list[str]:
+    """What the mark of a folder says; that of a copy, or of a folder renamed, is another."""
+    return [_SENTENCE, folder.name, str(folder.lstat().st_ino)]
+
+
+def _write_whole(mark: BinaryIO, lines: str) -> None:
+    data = lines.encode() + b"\n"
+    if mark.write(data) != len(data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _lines(mark: BinaryIO) -> list[str]:
+    """The whole lines of a mark; one that was not finished is none."""
+    mark.seek(0)
+    return mark.read(_LONGEST_MARK).decode("utf-8", errors="replace").split("\n")[:-1]
+
+
+def _siblings(folder: Path, mark: BinaryIO | None) -> list[Path]:
+    """The files beside a folder that belong to it, as its mark says, and what Blender calls them as it writes."""
+    names = [] if mark is None else [name for name in _lines(mark)[3:] if _BESIDE.fullmatch(name)]
+    return [folder.with_name(name + end) for name in names for end in ("", "@")]
+
+
+def _remove(path: Path) -> bool:
+    """Remove a file, or a folder with all in it; whether it is gone."""
+    with suppress(OSError):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    return not os.path.lexists(path)
 
 
 def _lock(file: BinaryIO) -> bool:
-    """Lock a file until it is closed; False where another one holds its lock."""
+    """Lock a file until it is closed; False where another one holds its lock, or the file system has no locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
 
+            file.seek(_LONGEST_MARK)  # behind the end: a byte that is locked could not be read by others
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            file.seek(0)
         else:
             import fcntl
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from .easing import Easing
 from .errors import InputError
-from .stretch import StretchLaw
+from .frames.easing import Easing
+from .numerics.symmetric_matrices import StretchLaw
 
 Mode = Literal["natural", "linear", "straight"]
 Engine = Literal["auto", "tetwild", "delaunay"]

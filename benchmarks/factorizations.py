@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 from qc3d_addon.solver.numerics.assembly import StiffnessPattern, stiffness_elements
 from qc3d_addon.solver.numerics.nested_dissection import dissection_order
-from qc3d_addon.solver.surface.deformation import hat_gradients, tangent_bases
+from qc3d_addon.solver.triangles.geometry import hat_gradients, tangent_bases
 
 from .catalogue import Floats, Ints
 from .report import table

@@ -7,9 +7,7 @@ from __future__ import annotations
 import argparse
 from typing import get_args
 
-from ..solver.frames.easing import Easing
-from ..solver.numerics.symmetric_matrices import StretchLaw
-from ..solver.settings import OF_THE_FIT, Engine, Mode, Quality, Settings
+from ..solver.settings import OF_THE_FIT, Easing, Engine, Mode, Quality, Settings, StretchLaw
 
 _DEFAULTS = Settings()
 _ALL = ("mode", "easing", *OF_THE_FIT)

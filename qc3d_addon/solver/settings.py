@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from .errors import InputError
-from .frames.easing import Easing
-from .numerics.symmetric_matrices import StretchLaw
 
+Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
+StretchLaw = Literal["linear", "logarithmic"]
 Mode = Literal["natural", "linear", "straight"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]

@@ -14,8 +14,8 @@ import pytest
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.run import bake_object
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.frames.easing import Easing, eased
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.frames.easing import eased
+from qc3d_addon.solver.settings import Easing, Settings
 
 Shapes = dict[str, np.ndarray]
 ReadShapes = Callable[[bpy.types.Object], Shapes]

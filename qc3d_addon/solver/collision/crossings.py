@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..surface.deformation import cross_product
+from ..triangles.geometry import cross_product
 from .box_tree import TriangleTree
 
 # Triangles that go through each other by less than this part of the surface's size touch.

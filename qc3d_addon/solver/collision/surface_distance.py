@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
-from ..surface.deformation import face_normals
+from ..numerics.grouped_sums import sums_by_label
+from ..triangles.geometry import face_normals
 
 # Triangles are found by the nearest of their samples: so many candidates for each point.
 _CANDIDATES = 12
@@ -73,8 +74,7 @@ def _vertex_normals(points: Floats, faces: Ints) -> Floats:
     for corner in range(3):
         along, across = corners[:, (corner + 1) % 3] - corners[:, corner], corners[:, corner - 1] - corners[:, corner]
         angles = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("fi,fi->f", along, across))
-        for axis in range(3):
-            total[:, axis] += np.bincount(faces[:, corner], weights=angles * unit[:, axis], minlength=len(points))
+        total += sums_by_label(faces[:, corner], angles[:, None] * unit, len(points))
     return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
 
 

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import eigsh
 from ..arrays import Floats
 from ..errors import InputError
 from ..numerics.assembly import StiffnessPattern, stiffness_elements
+from ..numerics.grouped_sums import sums_by_label
 from ..tets.mesh import TetMesh
 
 # A shift below the eigenvalue 0, in units of the domain's own lowest frequencies.
@@ -61,7 +62,7 @@ class Transfer:
         """(N,) a quarter of the volume of the tetrahedra around each vertex."""
         mesh = self._mesh
         weights = np.repeat(mesh.volumes / 4.0, 4)
-        return np.asarray(np.bincount(mesh.tets.ravel(), weights, len(mesh.points)), dtype=np.float64)
+        return sums_by_label(mesh.tets.ravel(), weights, len(mesh.points))
 
     @cached_property
     def to_vertices(self) -> csr_array:

@@ -14,7 +14,7 @@ from ..arrays import Floats
 from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
-from ..numerics.symmetric_matrices import StretchLaw
+from ..settings import StretchLaw
 from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix

@@ -4,13 +4,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from ..arrays import Floats
-
-Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
+from ..settings import Easing
 
 
 def eased(times: Floats, easing: Easing) -> Floats:

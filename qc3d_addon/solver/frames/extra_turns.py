@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import Embedding
+from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from ..numerics.rotations import rotation_matrices
 from ..surface.path import SurfacePath
 
@@ -46,7 +47,7 @@ class ExtraSpins:
         # The middle of a part that turns about still vertices is among them.
         pivots = still | ~np.isin(labels, labels[still])
         shares = np.where(pivots, embedding.weights, 0.0)[self._vertices]
-        self._shares: Floats = shares / np.bincount(self._parts, weights=shares)[self._parts]
+        self._shares: Floats = shares / sums_by_label(self._parts, shares)[self._parts]
 
     def __bool__(self) -> bool:
         return bool(len(self._vertices))
@@ -56,9 +57,7 @@ class ExtraSpins:
         if not self:
             return positions
         members = positions[self._vertices]
-        middles = np.stack([np.bincount(self._parts, weights=self._shares * column) for column in members.T], axis=1)[
-            self._parts
-        ]
+        middles = sums_by_label(self._parts, self._shares[:, None] * members)[self._parts]
         rotations = rotation_matrices(time * self._spins)[self._parts]
         spun = positions.copy()
         spun[self._vertices] = middles + np.einsum("nij,nj->ni", rotations, members - middles)
@@ -69,19 +68,12 @@ def _mean_turns(surface: SurfacePath, labels: Ints) -> Floats:
     """(components, 3) weighted means of the rotation vectors of each component's triangles; zero where it has none."""
     deformation = surface.deformation
     owner = labels[surface.vertices[deformation.faces[:, 0]]]
-    count = int(labels.max()) + 1
-    weight = np.bincount(owner, weights=deformation.weights, minlength=count)
-    sums = [np.bincount(owner, weights=deformation.weights * turn, minlength=count) for turn in deformation.turns.T]
-    return np.asarray(np.stack(sums, axis=1) / np.maximum(weight, 1e-300)[:, None])
+    return means_by_label(owner, deformation.turns, deformation.weights, int(labels.max()) + 1)
 
 
 def _held(points: Floats, still: Bools, labels: Ints) -> Bools:
     """(components,) whether the still vertices of a component lie on no common line."""
     count = int(labels.max()) + 1
     members, owner = points[still], labels[still]
-    size = np.maximum(np.bincount(owner, minlength=count), 1)[:, None]
-    middles = np.stack([np.bincount(owner, weights=column, minlength=count) for column in members.T], axis=1) / size
-    spread = members - middles[owner]
-    products = (spread[:, :, None] * spread[:, None, :]).reshape(-1, 9)
-    covariances = np.stack([np.bincount(owner, weights=column, minlength=count) for column in products.T], axis=1)
-    return np.asarray(np.linalg.eigvalsh(covariances.reshape(-1, 3, 3))[:, 1] > _LINE**2)
+    spread = members - means_by_label(owner, members, count=count)[owner]
+    return np.asarray(np.linalg.eigvalsh(covariances_by_label(owner, spread, spread, count))[:, 1] > _LINE**2)

@@ -17,7 +17,7 @@ from ..collision.colliders import Guard
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import PreparedMap
 from ..numerics.rotation_unwrapping import Turning, swing_beside
-from ..numerics.symmetric_matrices import StretchLaw
+from ..settings import StretchLaw
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from .easing import Easing, eased
+from ..settings import Easing
+from .easing import eased
 
 Singles = NDArray[np.float32]
 

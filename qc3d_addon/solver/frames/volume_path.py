@@ -16,7 +16,8 @@ from ..numerics.assembly import StiffnessPattern, stiffness_elements
 from ..numerics.nested_dissection import dissection_order, factored
 from ..numerics.rotation_unwrapping import Turning
 from ..numerics.rotations import products
-from ..numerics.symmetric_matrices import Stretch, StretchLaw
+from ..numerics.symmetric_matrices import Stretch
+from ..settings import StretchLaw
 from ..support.threads import batches, in_threads
 from ..tets.mesh import TetMesh
 

@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..numerics.rotations import rotation_matrices
 from ..numerics.screws import best_turns, translation_factors
+from ..triangles.geometry import vertex_areas
 from .keypair import KeyPair
 
 STILL_TOLERANCE = 1e-6
@@ -132,12 +133,3 @@ class Embedding:
         """(n,): vertex areas of the first key, with sum 1; loose vertices count as a small area."""
         areas = vertex_areas(self.key0, self.pair.faces)
         return np.asarray(areas / areas.sum())
-
-
-def vertex_areas(points: Floats, faces: Ints) -> Floats:
-    """(n,) a third of the area of the triangles around each vertex, never below a thousandth of the mean."""
-    corners = points[faces]
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    areas = np.bincount(faces.ravel(), weights=np.repeat(doubled / 6.0, 3), minlength=len(points))
-    mean = float(areas.mean())
-    return np.maximum(areas, 1e-3 * mean) if mean > 0.0 else np.ones(len(points))

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
-from ..surface.deformation import face_normals
+from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from ..triangles.closed_volume import ClosedComponents
-from ..triangles.topology import sides, sums_by_label, unique_edges, vertex_components, welded
+from ..triangles.geometry import areas
+from ..triangles.topology import sides, unique_edges, vertex_components, welded
 from .keypair import KeyPair
 
 # Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
@@ -53,9 +54,9 @@ def mirrored_share(pair: KeyPair) -> float:
     is_closed = np.zeros(len(first), dtype=bool)
     is_closed[labels[closed.faces[:, 0]]] = True
     mirrored = np.where(is_closed, first * second < 0.0, _are_mirror_images(keys[0], keys[1], labels))
-    areas = np.linalg.norm(face_normals(keys[0], faces), axis=1)
-    total = float(areas.sum())
-    return float(areas[mirrored[labels[faces[:, 0]]]].sum()) / total if total > 0.0 else 0.0
+    surface = areas(keys[0], faces)
+    total = float(surface.sum())
+    return float(surface[mirrored[labels[faces[:, 0]]]].sum()) / total if total > 0.0 else 0.0
 
 
 def _in_unit_size(key: Floats) -> Floats:
@@ -65,18 +66,16 @@ def _in_unit_size(key: Floats) -> Floats:
 
 def _are_mirror_images(key0: Floats, key1: Floats, labels: Ints) -> Bools:
     """(components,) whether a reflection carries a component onto the other key, and no turn does."""
-    counts = np.maximum(np.bincount(labels), 1)
-    spread = [key - (sums_by_label(labels, key) / counts[:, None])[labels] for key in (key0, key1)]
-    sizes = [np.sqrt(sums_by_label(labels, (points**2).sum(axis=1)[:, None])[:, 0]) for points in spread]
-    products = (spread[1][:, :, None] * spread[0][:, None, :]).reshape(-1, 9)
+    spread = [key - means_by_label(labels, key)[labels] for key in (key0, key1)]
+    sizes = [np.sqrt(sums_by_label(labels, (points**2).sum(axis=1))) for points in spread]
     scale = sizes[0] * sizes[1]
     usable = scale > 0.0
-    covariances = sums_by_label(labels, products)[usable] / scale[usable, None]
-    left, kept, right = np.linalg.svd(covariances.reshape(-1, 3, 3))
+    covariances = covariances_by_label(labels, spread[1], spread[0])[usable] / scale[usable, None, None]
+    left, kept, right = np.linalg.svd(covariances)
     is_odd = np.linalg.det(left) * np.linalg.det(right) < 0.0
     by_turn = _left_over(kept[:, 0] + kept[:, 1] - kept[:, 2])
     by_reflection = _left_over(kept.sum(axis=1))
-    found = np.zeros(len(counts), dtype=bool)
+    found = np.zeros(len(scale), dtype=bool)
     found[usable] = is_odd & (by_reflection < _BETTER * by_turn) & (by_turn > _LEFT_BY_TURNS)
     return found
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..numerics.grouped_sums import sums_by_label
 from .distortion import dilatation, inner_dilatation, outer_dilatation, singular_values, volume_ratio
 from .mapping import Mapping
 from .representation import eigen_form, upper_triangle
@@ -68,12 +69,11 @@ class Analysis:
         mesh = self.mapping.mesh
         good = self.measures["volume_ratio"] > 0.0
         corners, volumes = mesh.tets[good], np.repeat(mesh.volumes[good], 4)
-        weights = np.bincount(corners.ravel(), weights=volumes, minlength=len(mesh.points))
+        count = len(mesh.points)
+        weights = sums_by_label(corners.ravel(), volumes, count)
         means = {}
         for name, values in self.measures.items():
-            summed = np.bincount(
-                corners.ravel(), weights=volumes * np.repeat(np.log(values[good]), 4), minlength=len(mesh.points)
-            )
+            summed = sums_by_label(corners.ravel(), volumes * np.repeat(np.log(values[good]), 4), count)
             with np.errstate(invalid="ignore"):
                 means[name] = np.exp(summed / weights)
         return means

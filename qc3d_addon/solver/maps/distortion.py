@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..numerics.assembly import gradient_operator
 from ..numerics.rotations import determinants
-from ..surface.deformation import cross_product, hat_gradients, tangent_bases
+from ..triangles.geometry import areas, cross_product, hat_gradients, tangent_bases
 
 # Triangles whose area is below this part of their squared edges have no directions in floating point.
 _FLAT = 1e-14
@@ -78,8 +78,7 @@ class TriangleStretches:
 
     def __init__(self, rest: Floats, faces: Ints) -> None:
         edges = rest[faces[:, 1:]] - rest[faces[:, :1]]
-        areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        self._usable = areas > _FLAT * (edges**2).sum(axis=(1, 2))
+        self._usable = 2.0 * areas(rest, faces) > _FLAT * (edges**2).sum(axis=(1, 2))
         faces = faces[self._usable]
         self._gradient = gradient_operator(faces, hat_gradients(rest, faces, tangent_bases(rest, faces)), len(rest))
 

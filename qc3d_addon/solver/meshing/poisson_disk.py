@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 from ..settings import Quality
+from ..triangles.geometry import areas
 
 SizeField = Callable[[Floats], Floats]
 
@@ -97,12 +98,12 @@ def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools
 def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) -> Floats:
     """Poisson-disk samples (k, 3) of the triangles and of the vertices, about ``spacing`` apart."""
     corners = points[faces]
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    total = float(areas.sum())
+    sizes = areas(points, faces)
+    total = float(sizes.sum())
     count = min(int(np.ceil(_OVERSAMPLING * total / spacing**2)), _MOST_CANDIDATES)
     samples = np.empty((0, 3))
     if count:
-        triangle = rng.choice(len(faces), size=count, p=areas / total)
+        triangle = rng.choice(len(faces), size=count, p=sizes / total)
         weights = rng.dirichlet((1.0, 1.0, 1.0), size=count)
         samples = np.einsum("nk,nka->na", weights, corners[triangle])
         samples = samples[thin(samples, np.full(count, spacing))]

@@ -9,6 +9,7 @@ from numpy.random import Generator
 from scipy.spatial import Delaunay
 
 from ..arrays import Bools, Floats, Ints
+from ..numerics.grouped_sums import means_by_label
 from ..tets.mesh import OPPOSITE_FACES, TetMesh, edge_matrices
 from .poisson_disk import SizeField
 
@@ -90,9 +91,7 @@ def _centroids(mesh: TetMesh, size: SizeField) -> Floats:
     centroids = mesh.centroids
     weights = mesh.volumes / size(centroids) ** 3
     corners, count = mesh.tets.ravel(), len(mesh.points)
-    total = np.bincount(corners, np.repeat(weights, 4), count)
-    sums = [np.bincount(corners, np.repeat(weights * centroids[:, axis], 4), count) for axis in range(3)]
-    return np.stack(sums, axis=1) / total[:, None]
+    return means_by_label(corners, np.repeat(centroids, 4, axis=0), np.repeat(weights, 4), count)
 
 
 def _held(before: Floats, after: Floats, free: Bools) -> Floats:

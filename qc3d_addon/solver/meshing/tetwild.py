@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import MeshingError
+from ..numerics.grouped_sums import means_by_label
 from ..support.private_folders import PrivateFolder
 from ..tets.mesh import TetMesh
 from .poisson_disk import RESOLUTIONS, Resolution, sample_cube, sample_surface
@@ -93,8 +94,7 @@ def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:
     used, corners = np.unique(faces, return_inverse=True)
     _, cell_of = np.unique(np.floor(points[used] / cell).astype(np.int64), axis=0, return_inverse=True)
     cell_of = cell_of.reshape(-1)
-    population = np.bincount(cell_of)
-    means = np.stack([np.bincount(cell_of, points[used, axis]) / population for axis in range(3)], axis=1)
+    means = means_by_label(cell_of, points[used])
     merged = np.sort(cell_of[corners.reshape(-1, 3)], axis=1)
     merged = merged[(merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2])]
     kept, triangles = np.unique(np.unique(merged, axis=0), return_inverse=True)

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
+from .grouped_sums import covariances_by_label, sums_by_label
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
 _MOST_SWING = 1.55 * np.pi
@@ -89,7 +90,7 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
     phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
     far = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)) > _MOST_SWING
-    share = np.bincount(forest.labels, weights=weights * far) / np.bincount(forest.labels, weights=weights)
+    share = sums_by_label(forest.labels, weights * far) / sums_by_label(forest.labels, weights)
     twists = (share > _FAIR_SHARE)[forest.labels]
     twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
@@ -118,11 +119,8 @@ def _nearest_phase(phases: Floats, references: Floats) -> Floats:
 
 def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
     """(parts, 3) unit axes about which the parts turn most, pointing the way in which they turn."""
-    products = weights[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
-    summed = np.zeros((labels.max() + 1, 3, 3))
-    np.add.at(summed, labels, products)
-    axes = np.linalg.eigh(summed)[1][:, :, 2]
-    along = np.bincount(labels, weights=weights * np.einsum("ki,ki->k", vectors, axes[labels]))
+    axes = np.linalg.eigh(covariances_by_label(labels, weights[:, None] * vectors, vectors))[1][:, :, 2]
+    along = sums_by_label(labels, weights * np.einsum("ki,ki->k", vectors, axes[labels]))
     return np.asarray(axes * np.where(along < 0.0, -1.0, 1.0)[:, None])
 
 

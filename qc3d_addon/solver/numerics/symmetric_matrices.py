@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from ..arrays import Floats
+from ..settings import StretchLaw
 from .rotations import by_component, products
 
-StretchLaw = Literal["linear", "logarithmic"]
 _FLATTEST = 1e-16
 
 

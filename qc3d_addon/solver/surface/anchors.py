@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from ..numerics.rotations import rotation_matrices
 from ..numerics.screws import best_turns, translation_factors
-from ..triangles.topology import sums_by_label
 
 
 class ScrewAnchors:
@@ -35,11 +35,10 @@ class ScrewAnchors:
         parts = np.unique(labels[self._members], return_inverse=True)[1].ravel()
         source, target = key0[self._members], key1[self._members]
         weight = weights[self._members]
-        weight = weight / np.bincount(parts, weights=weight)[parts]
-        centres = [sums_by_label(parts, weight[:, None] * points) for points in (source, target)]
+        weight = weight / sums_by_label(parts, weight)[parts]
+        centres = [means_by_label(parts, points, weight) for points in (source, target)]
         spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
-        products = weight[:, None, None] * spread[1][:, :, None] * spread[0][:, None, :]
-        self._turns = best_turns(sums_by_label(parts, products.reshape(-1, 9)).reshape(-1, 3, 3))
+        self._turns = best_turns(covariances_by_label(parts, weight[:, None] * spread[1], spread[0]))
         rotations = rotation_matrices(self._turns)
         shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
         self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]

@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..numerics.rotations import products, rotation_vectors
 from ..numerics.symmetric_matrices import Stretch
+from ..triangles.geometry import face_normals, hat_gradients, planar_jacobians, tangent_bases
 
 # Triangles thinner than this part of the largest area have no usable directions in floating point; nor have those
 # whose area may come from rounding: this part of their longest edge times the largest coordinate.
@@ -117,46 +118,6 @@ def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
     np.subtract((scale * (two + root)) * first, across * second, out=closest[:, 0])
     np.subtract((scale * (one + root)) * second, across * first, out=closest[:, 1])
     return closest
-
-
-def cross_product(first: Floats, second: Floats) -> Floats:
-    """(3, ...) cross products of vectors (3, ...), stored by coordinate."""
-    (x, y, z), (u, v, w) = first, second
-    product = np.empty((3, *x.shape))
-    np.subtract(y * w, z * v, out=product[0])
-    np.subtract(z * u, x * w, out=product[1])
-    np.subtract(x * v, y * u, out=product[2])
-    return product
-
-
-def face_normals(positions: Floats, faces: Ints) -> Floats:
-    """(m, 3) normals of the triangles, twice as long as the areas."""
-    first, second, third = (positions[faces[:, corner]] for corner in range(3))
-    return np.asarray(np.cross(second - first, third - first))
-
-
-def tangent_bases(positions: Floats, faces: Ints) -> Floats:
-    """(m, 3, 3) orthonormal columns: along the first edge, across it in the plane, and the unit normal."""
-    normal = face_normals(positions, faces)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    along = positions[faces[:, 1]] - positions[faces[:, 0]]
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-    return np.stack([along, np.cross(normal, along), normal], axis=2)
-
-
-def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
-    """(m, 3, 2) gradients of the three hat functions of each triangle in its tangent basis."""
-    edges = np.stack(
-        [positions[faces[:, 1]] - positions[faces[:, 0]], positions[faces[:, 2]] - positions[faces[:, 0]]], axis=2
-    )
-    inner = np.linalg.inv(bases[:, :, :2].transpose(0, 2, 1) @ edges)
-    return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
-
-
-def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: Floats) -> Floats:
-    """(m, 2, 2) in-plane Jacobians from the tangent basis of ``gradients`` to that of ``bases``."""
-    corners = np.einsum("mki,mij->mkj", positions[faces], bases[:, :, :2])
-    return np.asarray(np.einsum("mki,mkj->mij", corners, gradients))
 
 
 def _planar_rotations(planar: Floats) -> Floats:

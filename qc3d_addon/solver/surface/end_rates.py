@@ -14,7 +14,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..numerics.rotations import rotation_matrices
-from ..numerics.symmetric_matrices import Stretch, StretchLaw
+from ..numerics.symmetric_matrices import Stretch
+from ..settings import StretchLaw
 
 
 def hermite(time: float, slope0: Floats, slope1: Floats) -> Floats:

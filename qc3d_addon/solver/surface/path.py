@@ -11,9 +11,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..keys.embedding import Embedding
+from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import Turning, consistent_turning
 from ..numerics.rotations import by_component
-from ..numerics.symmetric_matrices import Stretch, StretchLaw
+from ..numerics.symmetric_matrices import Stretch
+from ..settings import StretchLaw
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components, welded
 from .anchors import ScrewAnchors
@@ -90,7 +92,7 @@ class SurfacePath:
         self.components = labels[self._group]
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
-        weights: Floats = np.bincount(self._group, weights=embedding.weights, minlength=count).astype(np.float64)
+        weights = sums_by_label(self._group, embedding.weights, count)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
         size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
         area = float(self.deformation.weights.sum()) or size**2

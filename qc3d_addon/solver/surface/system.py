@@ -16,9 +16,10 @@ from ..arrays import Bools, Floats, Ints
 from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_elements
 from ..numerics.nested_dissection import dissection_order, factored
 from ..numerics.rotations import by_component
-from ..triangles.closed_volume import ClosedComponents, MovingVolumes
+from ..triangles.closed_volume import ClosedComponents
 from ..triangles.topology import distinct
 from .deformation import TriangleDeformation
+from .volumes import MovingVolumes
 
 
 class MovingSurface:

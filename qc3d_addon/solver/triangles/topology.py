@@ -74,11 +74,6 @@ def vertex_components(edges: Ints, count: int) -> Ints:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def sums_by_label(labels: Ints, values: Floats) -> Floats:
-    """(labels, c) sums of the rows of ``values`` (n, c) that carry each label 0, 1, 2, ... of ``labels`` (n,)."""
-    return np.stack([np.bincount(labels, weights=column) for column in values.T], axis=1)
-
-
 def closed_faces(faces: Ints, labels: Ints) -> Bools:
     """(m,) triangles of components that enclose a volume; ``labels`` are per vertex.
 

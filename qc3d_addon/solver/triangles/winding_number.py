@@ -7,8 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..numerics.grouped_sums import means_by_label, sums_by_label
 from ..support.threads import in_threads
-from ..surface.deformation import face_normals
+from .geometry import face_normals
 
 OUTSIDE_WEIGHT = 1e-3
 
@@ -73,7 +74,4 @@ def _dipoles(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
     keys = np.column_stack([np.floor(centres / cell), normals > 0.0])
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = group.ravel()
-    total = np.maximum(np.bincount(group, weights=areas), 1e-300)
-    summed = [np.bincount(group, weights=column) for column in normals.T]
-    middle = [np.bincount(group, weights=areas * column) / total for column in centres.T]
-    return np.stack(middle, axis=1), np.stack(summed, axis=1)
+    return means_by_label(group, centres, areas), sums_by_label(group, normals)

@@ -9,7 +9,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from qc3d_addon.solver.frames.easing import Easing, eased
+from qc3d_addon.solver.frames.easing import eased
+from qc3d_addon.solver.settings import Easing
 
 TIMES = np.linspace(0.0, 1.0, 101)
 

@@ -17,8 +17,8 @@ from qc3d_addon.solver.frames.chain import Bake, finish, inbetweens, prepare
 from qc3d_addon.solver.keys.embedding import RigidMotion
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.numerics.symmetric_matrices import Stretch, StretchLaw
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.numerics.symmetric_matrices import Stretch
+from qc3d_addon.solver.settings import Settings, StretchLaw
 from qc3d_addon.solver.triangles.topology import sides, unique_edges
 
 from ..meshes import arced, bent, box_surface, enclosed_volume, icosphere, twisted

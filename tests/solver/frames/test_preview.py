@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from qc3d_addon.solver.frames.easing import Easing, eased
+from qc3d_addon.solver.frames.easing import eased
 from qc3d_addon.solver.frames.preview import PreviewCurve
+from qc3d_addon.solver.settings import Easing
 
 RANDOM = np.random.default_rng(0)
 

@@ -12,7 +12,7 @@ from qc3d_addon.solver.frames.volume_path import VolumePath
 from qc3d_addon.solver.maps.representation import polar_decomposition
 from qc3d_addon.solver.numerics.rotation_unwrapping import Turning
 from qc3d_addon.solver.numerics.rotations import rotation_matrices, rotation_vectors
-from qc3d_addon.solver.numerics.symmetric_matrices import StretchLaw
+from qc3d_addon.solver.settings import StretchLaw
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_addon.solver.triangles.winding_number import insideness
 

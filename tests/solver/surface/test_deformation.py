@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.numerics.assembly import gradient_operator
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.numerics.symmetric_matrices import StretchLaw
+from qc3d_addon.solver.settings import StretchLaw
 from qc3d_addon.solver.surface.deformation import (
     TriangleDeformation,
     closest_tangents,

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.numerics.rotation_unwrapping import Turning
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.numerics.symmetric_matrices import Stretch, StretchLaw
+from qc3d_addon.solver.numerics.symmetric_matrices import Stretch
+from qc3d_addon.solver.settings import StretchLaw
 from qc3d_addon.solver.surface.end_rates import (
     end_spins,
     hermite,

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats
-from qc3d_addon.solver.keys.embedding import MARGIN, STILL_TOLERANCE, Embedding, RigidMotion, vertex_areas
+from qc3d_addon.solver.keys.embedding import MARGIN, STILL_TOLERANCE, Embedding, RigidMotion
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.triangles.geometry import vertex_areas
 
 from ..meshes import bent, box_surface, icosphere
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats, Ints
-from qc3d_addon.solver.triangles.closed_volume import ClosedComponents, MovingVolumes
+from qc3d_addon.solver.surface.volumes import MovingVolumes
+from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
 from qc3d_addon.solver.triangles.topology import sides, vertex_components
 
 from ..meshes import box_surface, enclosed_volume, icosphere

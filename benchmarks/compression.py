@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.experiments import shapes
-from qc3d_addon.solver import frame_compression
-from qc3d_addon.solver.compressed_files import Packer, Source
-from qc3d_addon.solver.compression import Codec, Scheme
+from qc3d_addon.solver.compression import frames as frame_compression
+from qc3d_addon.solver.compression.codec import Codec, Scheme
+from qc3d_addon.solver.compression.files import Packer, Source
+from qc3d_addon.solver.compression.search import Choice, Compressor
 from qc3d_addon.solver.errors import InputError, ReconstructionError
-from qc3d_addon.solver.rate import Choice, Compressor
+from qc3d_paper.experiments import shapes
 
 ERRORS = (1e-2, 3e-3, 1e-3, 1e-4)
 MODES = 300

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import Progress, evenly_spaced
+from qc3d_addon.solver.files.npz import read_pairs
+from qc3d_addon.solver.frames.chain import Progress, evenly_spaced
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.task import Task
-from qc3d_addon.solver.topology import sides
+from qc3d_addon.solver.triangles.topology import sides
 from qc3d_addon.worker import client
 
 from .catalogue import DATA

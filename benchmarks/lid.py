@@ -12,12 +12,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from qc3d_addon.blender.bake import bake_object
-from qc3d_addon.blender.mesh_data import key_coordinates, triangles
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.crossings import crossing_pairs
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+from qc3d_addon.solver.arrays import Floats
+from qc3d_addon.solver.collision.crossings import crossing_pairs
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import Floats
 
 FILE = Path(__file__).resolve().parents[1] / "assets" / "lid.blend"
 COUNT = 24

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qc3d_addon.solver import pipeline
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.prepared import PreparedMap
+from qc3d_addon.solver.fit.fitted_map import PreparedMap
+from qc3d_addon.solver.frames import chain as pipeline
+from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import Mode, Settings
 
 from .classical import arap, poisson

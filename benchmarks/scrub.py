@@ -17,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
-from qc3d_addon.solver.preview import PreviewCurve
+from qc3d_addon.solver.files.npz import read_pairs
+from qc3d_addon.solver.fit.storage import to_bytes
+from qc3d_addon.solver.frames.chain import evenly_spaced, finish, inbetweens, prepare
+from qc3d_addon.solver.frames.preview import PreviewCurve
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.storage import to_bytes
-from qc3d_addon.solver.task import Task
 from qc3d_addon.worker import client
 
 from .catalogue import DATA
@@ -80,7 +80,7 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     """Seconds from a place of the slider to the mesh that is drawn."""
     import bpy
 
-    from qc3d_addon.blender.mesh_data import key_coordinates, set_key_coordinates
+    from qc3d_addon.blender.store.mesh_data import key_coordinates, set_key_coordinates
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("Mesh")

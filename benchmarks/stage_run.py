@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import SuperLU
 
-    from qc3d_addon.solver.prepared import PreparedMap
+    from qc3d_addon.solver.fit.fitted_map import PreparedMap
 
 _REPEATS = 15
 
@@ -52,8 +52,8 @@ def main(arguments: list[str]) -> None:
 def stages(case: str, engine: str, count: int, one: bool) -> dict[str, Any]:
     """Seconds of each stage of a cold bake and of a warm one; if so wished, of one frame and its floor."""
     started = clock.perf_counter()
-    from qc3d_addon.solver.keypair import KeyPair
-    from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
+    from qc3d_addon.solver.frames.chain import evenly_spaced, finish, inbetweens, prepare
+    from qc3d_addon.solver.keys.keypair import KeyPair
     from qc3d_addon.solver.settings import Settings
 
     imported = clock.perf_counter() - started
@@ -84,9 +84,10 @@ def stages(case: str, engine: str, count: int, one: bool) -> dict[str, Any]:
 
 def _one_frame(prepared: PreparedMap) -> dict[str, float]:
     """Seconds of one frame, of the back-substitutions in it, and of the same ones by themselves, over and over."""
-    from qc3d_addon.solver import moving_surface, volume_path
-    from qc3d_addon.solver.factorization import factored
-    from qc3d_addon.solver.natural import NaturalFrames
+    from qc3d_addon.solver.frames import volume_path
+    from qc3d_addon.solver.frames.natural import NaturalFrames
+    from qc3d_addon.solver.numerics.nested_dissection import factored
+    from qc3d_addon.solver.surface import system
 
     watches: list[_Stopwatch] = []
 
@@ -94,7 +95,7 @@ def _one_frame(prepared: PreparedMap) -> dict[str, float]:
         watches.append(_Stopwatch(factored(matrix)))
         return watches[-1]
 
-    with patch.object(volume_path, "factored", watched), patch.object(moving_surface, "factored", watched):
+    with patch.object(volume_path, "factored", watched), patch.object(system, "factored", watched):
         maker = NaturalFrames(replace(prepared, paths={}))
     middle = np.array([0.4])
     list(maker.frames(middle))  # what is made on first use

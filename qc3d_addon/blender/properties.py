@@ -13,11 +13,12 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from ..solver.errors import InputError
 from ..solver.settings import OF_THE_FIT, Settings
-from . import checks, heat_map
-from .heat_colours import MEASURE_ITEMS
-from .names import MAX_STEPS
-from .records import Record
-from .requests import BakeRequest
+from .bake.request import BakeRequest
+from .heat_map import heat_map
+from .heat_map.colors import MEASURE_ITEMS
+from .store import checks
+from .store.names import MAX_STEPS
+from .store.records import Record
 
 _DESCRIPTIONS = {
     "mode": {

@@ -7,10 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from .easing import Easing
 from .errors import InputError
-from .stretch import StretchLaw
 
+Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
+StretchLaw = Literal["linear", "logarithmic"]
 Mode = Literal["natural", "linear", "straight"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]

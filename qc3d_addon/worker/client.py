@@ -19,10 +19,10 @@ from pathlib import Path
 
 from ..solver import errors
 from ..solver.errors import InputError, QC3DError, WorkerError
-from ..solver.interpreter import interpreter
-from ..solver.pipeline import STAGES, Progress
-from ..solver.private_folders import PrivateFolder
-from ..solver.task import Outcome, Task
+from ..solver.frames.chain import STAGES, Progress
+from ..solver.frames.task import Outcome, Task
+from ..solver.support.child_python import interpreter
+from ..solver.support.private_folders import PrivateFolder
 from .exchange import read_outcome, write_task
 from .idleness import LONGEST_IDLE, Idleness
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..solver.colliders import Collider
-from ..solver.keypair import KeyPair
-from ..solver.pipeline import Bake
+from ..solver.collision.colliders import Collider
+from ..solver.frames.chain import Bake
+from ..solver.frames.task import Outcome, Task
+from ..solver.keys.keypair import KeyPair
 from ..solver.settings import Settings
-from ..solver.task import Outcome, Task
 
 _TASK, _OUTCOME = "task.json", "outcome.json"
 

@@ -14,13 +14,15 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
-from qc3d_addon.blender import records, slider  # noqa: E402
-from qc3d_addon.solver import pipeline, preparation  # noqa: E402
-from qc3d_addon.solver.meshing import FilledCube  # noqa: E402
-from qc3d_addon.solver.pipeline import Progress  # noqa: E402
+from qc3d_addon.blender.keys import slider  # noqa: E402
+from qc3d_addon.blender.store import records  # noqa: E402
+from qc3d_addon.solver.fit import preparation  # noqa: E402
+from qc3d_addon.solver.frames import chain as pipeline  # noqa: E402
+from qc3d_addon.solver.frames.chain import Progress  # noqa: E402
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
+from qc3d_addon.solver.meshing.cube import FilledCube  # noqa: E402
 from qc3d_addon.solver.settings import Settings  # noqa: E402
-from qc3d_addon.solver.task import Outcome, Task, carry_out  # noqa: E402
-from qc3d_addon.solver.tetmesh import TetMesh  # noqa: E402
+from qc3d_addon.solver.tets.mesh import TetMesh  # noqa: E402
 from qc3d_addon.worker import client  # noqa: E402
 
 Shapes = dict[str, np.ndarray]

@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.bake import bake_object
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.easing import Easing, eased
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.frames.easing import eased
+from qc3d_addon.solver.settings import Easing, Settings
 
 Shapes = dict[str, np.ndarray]
 ReadShapes = Callable[[bpy.types.Object], Shapes]
@@ -217,7 +217,7 @@ class TestPanel:
         assert prepared.preparation == chosen.preparation
 
     def test_it_draws_a_row_for_each_key_and_only_what_is_there(self, figure: bpy.types.Object) -> None:
-        from qc3d_addon.blender.panels import QC3D_PT_inbetweens
+        from qc3d_addon.blender.ui.panels import QC3D_PT_inbetweens
 
         figure.qc3d.from_key, figure.qc3d.to_key = "Basis", "Stretch"
         figure.qc3d.via.add().name = "Lean"

@@ -13,9 +13,10 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import shape_keys, slider
-from qc3d_addon.solver import pipeline, task
+from qc3d_addon.blender.keys import shape_keys, slider
 from qc3d_addon.solver.errors import MeshingError
+from qc3d_addon.solver.frames import chain as pipeline
+from qc3d_addon.solver.frames import task
 
 State = Callable[[], dict[str, object]]
 OPERATORS = [bpy.ops.qc3d.bake_inbetweens, bpy.ops.qc3d.prepare]

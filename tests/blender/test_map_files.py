@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.records import Record
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.settings import Settings
 
 State = Callable[[], dict[str, Any]]

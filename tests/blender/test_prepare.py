@@ -33,7 +33,7 @@ def reload(folder: Path) -> None:
 def test_a_real_map_survives_saving_and_loading(
     figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work_here: None
 ) -> None:
-    from qc3d_addon.solver import task
+    from qc3d_addon.solver.frames import task
 
     real = {"quality": 'normal', "engine": 'delaunay'}
     assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}

@@ -20,15 +20,17 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
-from qc3d_addon.commands.reconstruct import read_landmarks
-from qc3d_addon.solver import compressed_files, map_files, storage
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.compression import Compressed
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.mapping_files import TetFile, read_tets, write_tets
-from qc3d_addon.solver.prepared import PreparedMap
+from qc3d_addon.cli.reconstruct import read_landmarks
+from qc3d_addon.solver.compression import files as compressed_files
+from qc3d_addon.solver.compression.codec import Compressed
+from qc3d_addon.solver.files.npz import read_pairs
+from qc3d_addon.solver.fit import files as map_files
+from qc3d_addon.solver.fit import storage
+from qc3d_addon.solver.fit.fitted_map import PreparedMap
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.maps.files import TetFile, read_tets, write_tets
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import TetMesh
+from qc3d_addon.solver.tets.mesh import TetMesh
 
 from ..solver.meshes import icosphere, jittered_grid
 

@@ -12,14 +12,12 @@ from typing import Any, get_args
 
 import numpy as np
 
-from qc3d_addon.solver.colliders import Collider
-from qc3d_addon.solver.easing import Easing
-from qc3d_addon.solver.pipeline import Bake, finish
-from qc3d_addon.solver.rotations import rotation_matrices
-from qc3d_addon.solver.sampling import RESOLUTIONS, Resolution
-from qc3d_addon.solver.settings import Mode, Settings
-from qc3d_addon.solver.stretch import StretchLaw
-from qc3d_addon.solver.task import Outcome, Task, carry_out
+from qc3d_addon.solver.collision.colliders import Collider
+from qc3d_addon.solver.frames.chain import Bake, finish
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out
+from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.settings import Easing, Mode, Settings, StretchLaw
 
 from ..solver.meshes import box_surface, icosphere, twisted
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from qc3d_addon.solver.meshing import engine_available, fill_cube
-from qc3d_addon.solver.sampling import RESOLUTIONS, Resolution
+from qc3d_addon.solver.meshing.cube import engine_available, fill_cube
+from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import TetMesh
+from qc3d_addon.solver.tets.mesh import TetMesh
 
 from .meshes import icosphere, jittered_grid, kuhn_grid, random_delaunay
 

@@ -17,14 +17,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qc3d_addon.solver.crossings import crossing_pairs
+from qc3d_addon.solver.arrays import Floats, Ints
+from qc3d_addon.solver.collision.crossings import crossing_pairs
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import Bake, finish, inbetweens, prepare
-from qc3d_addon.solver.prepared import PreparedMap
-from qc3d_addon.solver.rotations import rotation_matrices
+from qc3d_addon.solver.fit.fitted_map import PreparedMap
+from qc3d_addon.solver.frames.chain import Bake, finish, inbetweens, prepare
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.settings import Mode, Settings
-from qc3d_addon.solver.tetmesh import Floats, Ints
 
 from .meshes import arced, box_surface, enclosed_volume, icosphere, twisted
 

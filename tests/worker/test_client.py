@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.errors import InputError, MeshingError, QC3DError, WorkerError
-from qc3d_addon.solver.pipeline import Progress, evenly_spaced, finish
+from qc3d_addon.solver.frames.chain import Progress, evenly_spaced, finish
+from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.task import Task, carry_out
 from qc3d_addon.worker import client, idleness
 from qc3d_addon.worker.client import Limits, Worker
 

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qc3d_addon.solver.meshing import engine_available, fill_cube
-from qc3d_addon.solver.pipeline import Bake, evenly_spaced, finish
+from qc3d_addon.solver.fit.storage import from_bytes
+from qc3d_addon.solver.frames.chain import Bake, evenly_spaced, finish
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out
+from qc3d_addon.solver.meshing.cube import engine_available, fill_cube
 from qc3d_addon.solver.settings import Engine, Mode, Settings
-from qc3d_addon.solver.storage import from_bytes
-from qc3d_addon.solver.task import Outcome, Task, carry_out
 from qc3d_addon.worker import client
 
 from ..fuzz.mesh_cases import coarser

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..plans import Plan, plan_maps, write_maps
+from ..bake.plan import Plan, plan_maps, write_maps
+from ..bake.request import BakeRequest
 from ..properties import MapChoices, fill_from_panel, key_names, solver_settings
-from ..requests import BakeRequest
 from .child_work import ChildWork
 from .common import poll_active_object, poll_panel_keys
 
 if TYPE_CHECKING:
-    from ...solver.task import Outcome
+    from ...solver.frames.task import Outcome
 
 
 class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a chain as an Alembic file, written by Blender's own exporter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ...solver.errors import InputError
+from ...solver.files.npz import replacing
+from .. import compat
+from ..keys import shape_keys, slider
+from ..store.records import Chain
+
+
+def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
+    """Write the object as its slider goes from 0 to 1 over a number of frames, 1 to ``frames``, modifiers included.
+
+    A temporary copy is animated and exported, so the object and its animation stay as they are.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; what was there is kept.
+    """
+    scene, layer = context.scene, context.view_layer
+    before = (scene.frame_current, scene.frame_subframe)
+    selected, active = list(context.selected_objects), layer.objects.active
+    owner = shape_keys.slider_owner(obj, chain)
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    collection = bpy.data.collections.new("QC3D export")
+    scene.collection.children.link(collection)
+    collection.objects.link(copy)
+    keys = copy.data.shape_keys
+    try:
+        copy.animation_data_clear()
+        copy[chain.slider] = 0.0
+        for driver in slider.driven_by(keys, chain.slider).values():
+            if driver.variables[0].targets[0].id == owner:
+                driver.variables[0].targets[0].id = copy
+        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider))
+        for frame, value in ((1, 0.0), (frames, 1.0)):
+            curve.keyframe_points.insert(frame, value).interpolation = 'LINEAR'
+        for other in selected:
+            other.select_set(False)
+        copy.select_set(True)
+        layer.objects.active = copy
+        with replacing(path) as unfinished:
+            try:
+                result = bpy.ops.wm.alembic_export(
+                    filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
+                )
+            except RuntimeError as error:
+                raise InputError(f"{path} cannot be written: {error}") from error
+            if result != {'FINISHED'} or not unfinished.exists():
+                raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
+    finally:
+        action = copy.animation_data and copy.animation_data.action
+        mesh, key_action = copy.data, keys.animation_data and keys.animation_data.action
+        bpy.data.objects.remove(copy)
+        bpy.data.meshes.remove(mesh)
+        bpy.data.collections.remove(collection)
+        for block in (action, key_action):
+            if block is not None and block.users == 0:
+                bpy.data.actions.remove(block)
+        for other in selected:
+            other.select_set(True)
+        layer.objects.active = active
+        scene.frame_set(before[0], subframe=before[1])

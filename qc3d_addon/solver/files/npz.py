@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys and frames as .npz files, read without trusting them."""
+
+from __future__ import annotations
+
+import math
+import stat
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy_format
+from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..errors import InputError, naming_pair, reason
+from ..keys.keypair import KeyPair
+
+# All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd shapes.
+_UNREADABLE = (OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
+MOST_BYTES = 2**31  # of a file that is read, and of an array in it
+
+
+def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
+    """Read shapes of one mesh: a pair for every two of ``names`` that follow each other.
+
+    Parameters
+    ----------
+    path : Path
+        An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
+        of the names. Other arrays are not looked at; pickled objects are refused.
+    names : sequence of str
+        Names of two shapes or more, no name twice in a row.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys.
+    """
+    for first, second in pairwise(names):
+        if first == second and len(names) == 2:
+            raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
+        if first == second:
+            raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
+    with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
+        shape_names = read_array(archive, "shape_names", path)
+        if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
+            raise InputError(f"shape_names in {path} must be a list of texts, a name for each shape.")
+        known = shape_names.tolist()
+        for name in names:
+            if name not in known:
+                raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
+        keys = {name: read_array(archive, f"V{known.index(name)}", path) for name in names}
+        faces = read_array(archive, "faces", path)
+    for name, key in keys.items():
+        if key.dtype.kind not in "fiu":
+            raise InputError(f"The shape {name!r} in {path} holds {key.dtype} values; coordinates must be numbers.")
+    pairs = []
+    for first, second in pairwise(names):
+        with naming_pair(first, second, names):
+            pairs.append(KeyPair.checked(keys[first], keys[second], faces))
+    return pairs
+
+
+def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats) -> None:
+    """Write frames (k, n, 3) at ``times`` (k,) with the faces, the first and the last key of the pairs, compressed.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    write_arrays(path, faces=pairs[0].faces, frames=frames, times=times, key0=pairs[0].key0, key1=pairs[-1].key1)
+
+
+def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
+    """Write arrays to an .npz file, compressed.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written. ``np.savez`` would then write a traceback to standard error besides.
+    """
+    npy: Any = npy_format  # without types in some versions
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                npy.write_array(entry, np.asanyarray(array), allow_pickle=False)
+
+
+@contextmanager
+def open_archive(path: Path, needed: str) -> Iterator[NpzFile]:
+    """Open an .npz file of arrays, without pickled objects; ``needed`` says what it should hold.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is something else.
+    """
+    require_file(path)
+    with ExitStack() as stack:
+        try:
+            # Not np.load: it would read any other file of numpy whole before it could be refused.
+            file: Any = stack.enter_context(path.open("rb"))  # numpy's types expect a text file in some versions
+            archive = NpzFile(file, allow_pickle=False)
+        except OSError as error:
+            raise unreadable(path, error) from error
+        except _UNREADABLE as error:
+            raise InputError(f"{path} is not an .npz file of arrays; {needed}.") from error
+        yield stack.enter_context(archive)
+
+
+def read_array(archive: NpzFile, name: str, path: Path) -> NDArray[np.generic]:
+    """An array of an open archive; ``path`` is named where it is not there.
+
+    Raises
+    ------
+    InputError
+        If there is no such array, or it cannot be read.
+    """
+    try:
+        if name in archive.files:
+            assert archive.zip is not None
+            _require_size(archive.zip, f"{name}.npy")
+        array: NDArray[np.generic] = archive[name]
+    except KeyError:
+        raise InputError(f"{path} has no array {name}; it has {', '.join(archive.files) or 'none'}.") from None
+    except _UNREADABLE as error:
+        raise unreadable(f"The array {name} in {path}", error) from error
+    return array
+
+
+def require_file(path: Path, most: int = MOST_BYTES) -> None:
+    """Check a name before it is opened: pipes and devices may never end.
+
+    Raises
+    ------
+    InputError
+        If there is no ordinary file of that name, or it is larger than any file should be that is read here.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from error
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{path} is no file that can be read; name a file.")
+    if found.st_size > most:
+        raise InputError(f"{path} has {found.st_size} bytes, and at most {most} are read; make it smaller.")
+
+
+def unreadable(what: Path | str, error: BaseException) -> InputError:
+    """The error to raise where reading failed."""
+    return InputError(f"{what} cannot be read: {reason(error)}; export it again, or name another file.")
+
+
+def require_sizes(archive: zipfile.ZipFile) -> None:
+    """Check, before anything is allocated, that every array is as large as its entry says, and all can be held.
+
+    Raises
+    ------
+    ValueError
+        If not.
+    """
+    if sum(info.file_size for info in archive.infolist()) > MOST_BYTES:
+        raise ValueError("the arrays are too large")
+    for info in archive.infolist():
+        _require_size(archive, info.filename)
+
+
+def _require_size(archive: zipfile.ZipFile, name: str) -> None:
+    """Raise ValueError unless an array is as large as its entry says, and of a size that can be held."""
+    npy: Any = npy_format  # without types in some versions
+    info = archive.getinfo(name)
+    if info.file_size > MOST_BYTES:
+        raise ValueError(f"it has {info.file_size} bytes, and at most {MOST_BYTES} are read")
+    with archive.open(info) as file:
+        read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+        version = npy.read_magic(file)
+        if version not in read_header:
+            raise ValueError(f"it has version {version}, which is not known")
+        try:
+            shape, _, dtype = read_header[version](file)
+        except tokenize.TokenError as error:
+            raise ValueError("its header cannot be parsed") from error
+        if dtype.hasobject:
+            raise ValueError("it holds objects of Python, which are never read")
+        if file.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
+            raise ValueError("it is not as large as it says")

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tomllib
 from collections.abc import Iterable, Sequence
 from importlib import metadata
@@ -15,15 +14,16 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..solver.arrays import Floats
-from ..solver.errors import InputError, QC3DError, naming_pair, on_one_line
-from ..solver.files.npz import read_pairs, replacing_all, write_frames
+from ..solver.errors import InputError, QC3DError, naming_pair, on_one_line, reason, with_remedy
+from ..solver.files.atomic import replacing_all, require_writable
+from ..solver.files.npz import read_pairs, write_frames
 from ..solver.frames.chain import Bake, Steps, chain_inbetweens, evenly_spaced, finish, prepare
 from ..solver.frames.straight import straight_inbetweens
 from ..solver.frames.task import Task
 from ..solver.keys.keypair import KeyPair
 from ..solver.settings import Settings
 from ..solver.support.memory import machine_limit_mb
-from . import analyze, compress, reconstruct, reproduce
+from . import analyze, compress, reconstruct, reproduce, speech
 from .options import add_settings, settings_of, whole_number
 from .progress_bars import StageBars
 
@@ -37,38 +37,49 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     0 when it is done; 2 when the input is not usable, with one sentence on standard error; 130 when interrupted.
     """
+    problem = None
     try:
         arguments = _parser().parse_args(argv)
         arguments.run(arguments)
     except QC3DError as error:
-        print(f"qc3d: {error}", file=sys.stderr)
-        return 2
+        problem = str(error)
     except MemoryError:
-        print("qc3d: There is not enough memory; use fewer frames, a lower quality or a smaller mesh.", file=sys.stderr)
-        return 2
+        problem = "There is not enough memory; use fewer frames, a lower quality or a smaller mesh."
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        problem = on_one_line(f"The system refuses to go on: {with_remedy(error)}{where}.")
+    except RuntimeError as error:
+        if "start new thread" not in str(error):
+            raise
+        problem = "The system allows no more threads; close some programs, or raise the limit (ulimit -u)."
     except KeyboardInterrupt:
-        print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
+        speech.note("Interrupted; nothing was written.")
         return 130
+    finally:
+        speech.flush()  # the texts of --help and --version too
+    unheard = speech.take_unheard()
+    if problem is None and unheard is not None:
+        problem = f"Standard output cannot be written: {reason(unheard)}; all files are complete."
+    if problem is not None:
+        speech.note(problem)
+        return 2
     return 0
 
 
 def _interpolate(arguments: argparse.Namespace) -> None:
     settings = settings_of(arguments)
-    _require_distinct_files(arguments.pair, arguments.output, arguments.report)
+    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    require_writable(*files, inputs=[arguments.pair])
     names = _key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * len(pairs) - 1)
     Task(dict(zip(pairwise(names), pairs, strict=True)), names, settings, times).require_memory(machine_limit_mb())
-    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    with StageBars() as bars:
+        bake = finish(_inbetweens(pairs, names, times, settings), bars)
     with replacing_all(*files) as (output, *reports):
-        with StageBars() as bars:
-            bake = finish(_inbetweens(pairs, names, times, settings), bars)
-        try:
-            write_frames(output, pairs, bake.times, bake.frames)
-            for report in reports:
-                report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
+        write_frames(output, pairs, bake.times, bake.frames)
+        for report in reports:
+            report.write_text(json.dumps(bake.report, indent=1) + "\n", encoding="utf-8")
     _print_notes(bake.report["notes"])
 
 
@@ -88,8 +99,6 @@ def _bake(arguments: argparse.Namespace) -> None:
         from ..blender.bake.run import bake_file
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
-    _require_distinct_files(arguments.file, arguments.report)
-    _require_distinct_files(arguments.output, arguments.report)
     request = BakeRequest(
         _key_names(arguments),
         arguments.frames,
@@ -104,18 +113,11 @@ def _bake(arguments: argparse.Namespace) -> None:
 
 def _print_notes(notes: Iterable[str]) -> None:
     for note in notes:
-        print(f"qc3d: {on_one_line(note)}", file=sys.stderr)
+        speech.note(on_one_line(note))
 
 
 def _key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
     return (arguments.first, *arguments.via, arguments.last)
-
-
-def _require_distinct_files(*paths: Path | None) -> None:
-    seen: dict[Path, Path] = {}
-    for path in paths:
-        if path is not None and seen.setdefault(path.resolve(), path) is not path:
-            raise InputError(f"{path} is named twice; input, output and report must be different files.")
 
 
 def _parser() -> argparse.ArgumentParser:

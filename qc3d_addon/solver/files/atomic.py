@@ -93,11 +93,10 @@ def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
         folders, new = [], []
         for path, target in zip(paths, targets, strict=True):
             with _as_input_error(path, _UNWRITTEN):
-                folder = PrivateFolder(target.parent)
-                stack.callback(folder.close)
+                private = PrivateFolder(target.parent)
+                folders.append(stack.enter_context(private))
                 suffix = target.suffix[:_LONGEST_SUFFIX]
-                folders.append(folder.path)
-                new.append(folder.beside(suffix) if beside else folder.path / f"new{suffix}")
+                new.append(private.beside(suffix) if beside else private.path / f"new{suffix}")
         with _as_input_error(" or ".join(map(str, paths)), _UNWRITTEN):
             yield new
         for path, file, folder in zip(paths, new, folders, strict=True):

@@ -84,7 +84,7 @@ def set_aside(target: Path, folder: Path) -> Path | None:
 
 
 def put_back(target: Path, kept: Path | None, new: os.stat_result) -> None:
-    """Undo a replacement: what was set aside is there again, or nothing where nothing was; also where it was not done."""
+    """Undo a replacement, which need not have been done: what was set aside is there again, or nothing."""
     if kept is not None:
         kept.replace(target)
     elif target.exists() and os.path.samestat(target.stat(), new):

@@ -123,11 +123,11 @@ def write_tets(path: Path, content: TetFile) -> None:
         If the file cannot be written, or the ending is unknown.
     """
     with replacing(path) as unfinished:
-        put_tets(unfinished, content)
+        put_tets(unfinished, content, path)
 
 
-def put_tets(path: Path, content: TetFile) -> None:
-    """As ``write_tets``, straight into a file.
+def put_tets(new: Path, content: TetFile, path: Path) -> None:
+    """As ``write_tets``, straight into the file ``new``, which errors call ``path``.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def put_tets(path: Path, content: TetFile) -> None:
     """
     if path.suffix.lower() == ".npz":
         arrays: dict[str, Any] = {**content.at_vertices, **content.at_tets}
-        write_arrays(path, points=content.points, tets=content.tets, **arrays)
+        write_arrays(new, points=content.points, tets=content.tets, **arrays)
         return
     meshio = _meshio()
     if path.suffix.lower() in _BARE:
@@ -148,7 +148,7 @@ def put_tets(path: Path, content: TetFile) -> None:
         at_tets = {name: [pad(values)] for name, values in content.at_tets.items()}
         found = meshio.Mesh(content.points, [("tetra", content.tets)], content.at_vertices, at_tets)
     with _meshio_errors(path, "written"):
-        found.write(path, _format(path))
+        found.write(new, _format(path))
 
 
 def _format(path: Path) -> str | None:
@@ -184,6 +184,8 @@ def _meshio_errors(path: Path, done: str) -> Iterator[None]:
         with redirect_stdout(said), redirect_stderr(said):
             yield
     except (Exception, SystemExit) as error:
+        if isinstance(error, OSError) and done == "written":
+            raise
         reason = " ".join(str(error).split()) if not isinstance(error, SystemExit) else "not a format meshio knows"
         remedy = "export it again, or name another file" if done == "read" else "choose another format or place"
         reason = reason.rstrip(".") or type(error).__name__

@@ -85,7 +85,7 @@ def _write(analysis: Analysis, prepared: PreparedMap | None, paths: list[Path]) 
                 "landmark_residual": prepared.landmark_residual(),
                 **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
             }
-            write_arrays(surface[0], faces=pair.faces, key0=pair.key0, key1=pair.key1, **measures)
+            write_arrays(surface[0], {"faces": pair.faces, "key0": pair.key0, "key1": pair.key1, **measures})
             save_distortion(pair, measures, surface[1])
         text.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 

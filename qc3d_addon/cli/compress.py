@@ -101,7 +101,7 @@ def _decompress(arguments: argparse.Namespace) -> None:
         source = frame_compression.source_of(first, faces)
         frames = frame_compression.restored(first, read_compressed(arguments.file, source))
         with replacing(arguments.output) as unfinished:
-            write_arrays(unfinished, faces=faces, frames=frames, key0=first, key1=frames[-1])
+            write_arrays(unfinished, {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]})
         return
     content = read_tets(arguments.mesh)
     mesh = content.mesh()

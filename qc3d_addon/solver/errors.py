@@ -15,6 +15,7 @@ _REMEDIES = {
     "ENOSPC": "make room on that disk, or choose another one",
     "EDQUOT": "make room within your quota, or choose another disk",
     "EFBIG": "raise the limit on the size of files (ulimit -f), or choose another disk",
+    "ENOENT": "make that folder first, or choose another one",
     "ENAMETOOLONG": "choose a shorter name",
     "EACCES": "choose another place, or ask for access to this one",
     "EPERM": "choose another place, or ask for access to this one",

@@ -93,6 +93,7 @@ def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
         folders, new = [], []
         for path, target in zip(paths, targets, strict=True):
             with _as_input_error(path, _UNWRITTEN):
+                require_replaceable(path, target)
                 private = PrivateFolder(target.parent)
                 folders.append(stack.enter_context(private))
                 suffix = target.suffix[:_LONGEST_SUFFIX]

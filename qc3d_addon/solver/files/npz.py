@@ -9,7 +9,7 @@ import stat
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -78,19 +78,21 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
     OSError
         If the file cannot be written.
     """
-    write_arrays(path, faces=pairs[0].faces, frames=frames, times=times, key0=pairs[0].key0, key1=pairs[-1].key1)
+    ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
+    write_arrays(path, {"faces": pairs[0].faces, "frames": frames, "times": times, **ends})
 
 
-def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
-    """Write arrays to an .npz file, compressed.
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:
+    """Write arrays to an .npz file, as ``np.savez`` does; of an error nothing is left, no open file and no warning.
 
     Raises
     ------
     OSError
-        If the file cannot be written. ``np.savez`` would then write a traceback to standard error besides.
+        If the file cannot be written.
     """
     npy: Any = npy_format  # without types in some versions
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    method = zipfile.ZIP_DEFLATED if is_compressed else zipfile.ZIP_STORED
+    with zipfile.ZipFile(path, "w", method) as archive:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
                 npy.write_array(entry, np.asanyarray(array), allow_pickle=False)

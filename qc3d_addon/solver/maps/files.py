@@ -137,8 +137,8 @@ def put_tets(new: Path, content: TetFile, path: Path) -> None:
         If the file cannot be written.
     """
     if path.suffix.lower() == ".npz":
-        arrays: dict[str, Any] = {**content.at_vertices, **content.at_tets}
-        write_arrays(new, points=content.points, tets=content.tets, **arrays)
+        mesh = {"points": content.points, "tets": content.tets}
+        write_arrays(new, {**mesh, **content.at_vertices, **content.at_tets})
         return
     meshio = _meshio()
     if path.suffix.lower() in _BARE:

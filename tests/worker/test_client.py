@@ -314,7 +314,8 @@ def test_no_room_for_the_task(monkeypatch: pytest.MonkeyPatch, temporary: Path) 
 
 def test_no_folder_for_temporary_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    assert f"temporary files in {tmp_path / 'none'}: No such file or directory; make that folder first" in str(failure())
+    said = str(failure())
+    assert f"temporary files in {tmp_path / 'none'}: No such file or directory; make that folder first" in said
 
 
 def test_no_interpreter(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> None:

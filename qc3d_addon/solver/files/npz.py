@@ -21,7 +21,7 @@ from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..errors import InputError, naming_pair, reason
+from ..errors import InputError, naming_pair, reason, remedy_of_limit
 from ..keys.keypair import KeyPair
 
 # All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd shapes.
@@ -160,7 +160,8 @@ def require_file(path: Path, most: int = MOST_BYTES) -> None:
 
 def unreadable(what: Path | str, error: BaseException) -> InputError:
     """The error to raise where reading failed."""
-    return InputError(f"{what} cannot be read: {reason(error)}; export it again, or name another file.")
+    remedy = remedy_of_limit(error) or "export it again, or name another file"
+    return InputError(f"{what} cannot be read: {reason(error)}; {remedy}.")
 
 
 def require_sizes(archive: zipfile.ZipFile) -> None:

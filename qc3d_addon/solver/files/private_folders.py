@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import secrets
@@ -92,12 +91,13 @@ def remove(folder: Path, mark: BinaryIO | None = None) -> None:
         The open mark, which is closed; what it names beside the folder goes as well.
     """
     left = [path for path in _siblings(folder, mark) if not _remove(path)]
+    if mark is not None:
+        mark.close()  # before a folder is opened: there may be no more files than this that may be open
     with suppress(OSError):
         left += [path for path in folder.iterdir() if path.name != _MARK and not _remove(path)]
-    if mark is not None:
-        mark.close()
-    if not left:
-        _remove(folder)
+    if not left and _remove(folder / _MARK):
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def remove_abandoned(parent: Path) -> None:
@@ -132,8 +132,8 @@ def _identity(folder: Path) -> list[str]:
 
 def _write_whole(mark: BinaryIO, lines: str) -> None:
     data = lines.encode() + b"\n"
-    if mark.write(data) != len(data):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    while data:
+        data = data[mark.write(data) :]  # what finds no room the first time is refused the second time
 
 
 def _lines(mark: BinaryIO) -> list[str]:

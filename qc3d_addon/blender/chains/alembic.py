@@ -14,8 +14,8 @@ from .. import compat
 from ..keys import shape_keys, slider
 from ..store.records import Chain
 
-# Of a vertex or a corner of a face: its position or normal in each frame; its index, place and texture coordinates.
-_BYTES_OF_FRAME, _BYTES_ONCE = 12, 64
+# Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
+_BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
 _BYTES_BESIDE = 2**20
 
 
@@ -94,4 +94,5 @@ def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: in
             modifier.levels = modifier.render_levels
     mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
     corners = len(mesh.vertices) + len(mesh.loops)
-    return corners * (_BYTES_OF_FRAME * frames + _BYTES_ONCE) + _BYTES_BESIDE
+    once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
+    return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

@@ -23,6 +23,7 @@ SOLVER_FLOORS = (
     ("surface", "collision", "maps"),
     ("fit", "compression"),
     ("frames",),
+    ("steps",),
     ("api",),
 )
 ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))

@@ -8,6 +8,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,17 +16,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..solver.errors import InputError
-from ..solver.files.npz import read_pairs, replacing_all
-from ..solver.frames.chain import finish, prepare
+from ..solver.files.npz import replacing_all
+from ..solver.fit.fit_pair import fit_pair
 from ..solver.frames.measures import VertexMeasures
+from ..solver.keys.files import read_pair
 from ..solver.maps.analysis import Analysis
 from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
 from ..solver.maps.mapping import Mapping
-from .options import add_settings, settings_of
+from ..solver.settings import FitOptions
+from ..solver.support.progress import finish
+from .options import add_options, fit_options
 from .progress_bars import StageBars
 
 if TYPE_CHECKING:
-    from ..solver.fit.fitted_map import PreparedMap
+    from ..solver.fit.fitted_map import FittedMap
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -43,28 +47,28 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
     command.add_argument("--format", choices=("npz", "vtu", "vtk", "msh"), default="npz", help="of mapping.* (npz)")
     command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
-    add_settings(command, frames=False)
+    add_options(command, FitOptions)
     command.set_defaults(run=_run)
 
 
 def _run(arguments: argparse.Namespace) -> None:
     if find_spec("matplotlib") is None:
         raise InputError("The pictures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
-    prepared = None
+    fitted = None
     if (arguments.first is None) != (arguments.last is None):
         raise InputError("Two shapes are needed; give both --from and --to, or neither for a mesh of tetrahedra.")
     if arguments.first is not None:
         if arguments.target is not None:
             raise InputError("--target belongs to meshes of tetrahedra; leave it out, or --from and --to.")
-        pair = read_pairs(arguments.input, (arguments.first, arguments.last))[0]
+        pair = read_pair(arguments.input, arguments.first, arguments.last)
         with StageBars() as bars:
-            prepared = finish(prepare(pair, settings_of(arguments)), bars)
-        mapping = Mapping(prepared.mesh, prepared.mapped)
+            fitted = finish(fit_pair(pair, fit_options(arguments)), bars)
+        mapping = Mapping(fitted.mesh, fitted.mapped)
     else:
         mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
     analysis = Analysis(mapping)
     with _folder(arguments.output):
-        _write(analysis, prepared, arguments.output, arguments.format)
+        _write(analysis, fitted, arguments.output, arguments.format)
 
 
 @contextmanager
@@ -84,24 +88,24 @@ def _folder(path: Path) -> Iterator[None]:
         raise
 
 
-def _write(analysis: Analysis, prepared: PreparedMap | None, folder: Path, ending: str) -> None:
+def _write(analysis: Analysis, fitted: FittedMap | None, folder: Path, ending: str) -> None:
     from qc3d_paper.drawing.slices import save_histograms, save_slices
     from qc3d_paper.drawing.surfaces import save_distortion
 
     summary = analysis.summary()
     names = [f"mapping.{ending}", "histograms.png", "slices.png", "summary.json"]
-    names += [] if prepared is None else ["surface.npz", "surface.png"]
+    names += [] if fitted is None else ["surface.npz", "surface.png"]
     with replacing_all(*(folder / name for name in names)) as (mapping, histograms, slices, text, *surface):
         write_tets(mapping, _with_attributes(analysis))
         try:
             save_histograms(analysis, histograms)
             save_slices(analysis, slices)
-            if prepared is not None:
-                pair = prepared.pair
-                measures = VertexMeasures([prepared]).of(0, pair.key1, prepared.mapped)
+            if fitted is not None:
+                pair = fitted.pair
+                measures = VertexMeasures([fitted]).of(0, pair.key1, fitted.mapped)
                 summary["surface"] = {
                     "vertices": len(pair.key0),
-                    "landmark_residual": prepared.landmark_residual(),
+                    "landmark_residual": asdict(fitted.landmark_residual()),
                     **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
                 }
                 arrays: dict[str, Any] = dict(measures)

@@ -17,7 +17,7 @@ from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
 from ..triangles.closed_volume import ClosedComponents
-from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components, welded
+from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components
 from .anchors import ScrewAnchors
 from .deformation import TriangleDeformation, tangents_of
 from .end_rates import (
@@ -71,7 +71,7 @@ class SurfacePath:
 
     def __init__(self, embedding: Embedding, law: StretchLaw = "linear", free_after_turns: bool = False) -> None:
         self._law: StretchLaw = law
-        self.vertices, self._group = welded(embedding.key0, embedding.key1)
+        self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._travel = key1 - self._key0
         still = embedding.still[self.vertices]

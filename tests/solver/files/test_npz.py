@@ -18,8 +18,9 @@ from numpy.lib import format as npy
 from qc3d_addon.cli.reconstruct import read_landmarks
 from qc3d_addon.solver.compression.files import Source, read_compressed
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.files.npz import read_pairs, replacing_all
+from qc3d_addon.solver.files.npz import replacing_all
 from qc3d_addon.solver.fit.files import read_maps
+from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.maps.files import read_tets
 
 from ..meshes import icosphere, kuhn_grid

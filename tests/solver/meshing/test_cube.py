@@ -13,7 +13,7 @@ from qc3d_addon.solver.meshing import cube, tetwild_loading
 from qc3d_addon.solver.meshing.cube import FilledCube, engine_available, fill_cube, require_filled_cube
 from qc3d_addon.solver.meshing.slivers import smallest_dihedral_angles
 from qc3d_addon.solver.meshing.tetwild_loading import unavailable_reason
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import OPPOSITE_FACES, TetMesh
 from qc3d_addon.solver.tets.point_location import interpolation_matrix
 
@@ -30,7 +30,7 @@ ENGINES = [
 
 
 def fill(points: Floats, faces: Ints, engine: str, **choices: object) -> FilledCube:
-    return fill_cube(points, faces, Settings(engine=engine, **{"quality": "normal", **choices}))  # type: ignore[arg-type]
+    return fill_cube(points, faces, FitOptions(engine=engine, **choices))  # type: ignore[arg-type]
 
 
 def assert_partition_of_the_cube(mesh: TetMesh) -> None:

@@ -79,7 +79,7 @@ def test_a_kept_map_gives_the_same_frames_again(engine: Engine) -> None:
         pytest.skip(f"the engine {engine} cannot run here")
     first = client.run(task_with(engine))
     again = task_with(engine, kept=first.fits)
-    assert again.new_maps == 0
+    assert again.new_fits == 0
     outcomes = [first, client.run(again), finish(carry_out(again))]
     assert len({frames_of(outcome) for outcome in outcomes}) == 1
     assert all(outcome.fits == first.fits for outcome in outcomes)

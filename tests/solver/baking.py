@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames for tests, from fits that are there already."""
+"""What tests bake with: engines that can run here, frames from fits that are there already."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ from qc3d_addon.solver.fit.fitted_map import FittedMap
 from qc3d_addon.solver.frames.bake import Bake, checked_times
 from qc3d_addon.solver.frames.chain import chain_frames
 from qc3d_addon.solver.frames.following import Following
+from qc3d_addon.solver.meshing.tetwild_loading import unavailable_reason
 from qc3d_addon.solver.settings import Easing, FrameOptions, Mode
 from qc3d_addon.solver.support.progress import Progress, finish
+
+
+def engine_available(name: str) -> bool:
+    """Whether the engine can run here; cheap, loads nothing compiled."""
+    return name in ("auto", "delaunay") or unavailable_reason() is None
 
 
 def frames_of(

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from qc3d_addon.solver.meshing.cube import engine_available, fill_cube
+from qc3d_addon.solver.meshing.cube import fill_cube
 from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
 from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import TetMesh
 
+from .baking import engine_available
 from .meshes import icosphere, jittered_grid, kuhn_grid, random_delaunay
 
 # On a busy machine any example can take long; how long a test may take is decided by its number of examples.

@@ -17,12 +17,13 @@ import pytest
 from qc3d_addon.solver.fit.storage import from_bytes
 from qc3d_addon.solver.frames.bake import Bake, evenly_spaced
 from qc3d_addon.solver.frames.task import Outcome, Task, carry_out
-from qc3d_addon.solver.meshing.cube import engine_available, fill_cube
+from qc3d_addon.solver.meshing.cube import fill_cube
 from qc3d_addon.solver.settings import Engine, FitOptions, FrameOptions, Mode
 from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.worker import client
 
 from ..fuzz.mesh_cases import coarser
+from ..solver.baking import engine_available
 from ..solver.meshes import arced, box_surface, icosphere
 
 KEYS = ("Basis", "Bent")

@@ -39,11 +39,6 @@ class FilledCube:
     notes: tuple[str, ...]
 
 
-def engine_available(name: str) -> bool:
-    """Whether the engine can run here; cheap, loads nothing compiled."""
-    return name in ("auto", "delaunay") or (name == "tetwild" and unavailable_reason() is None)
-
-
 def fill_cube(points: Floats, faces: Ints, options: FitOptions) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 

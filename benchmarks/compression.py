@@ -36,8 +36,8 @@ def main() -> None:
     print("| what | error | modes | remainder | bytes | of raw | quantised + deflate | ratio | folds | theirs |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for pose in (shapes.DATA_FACES[1], shapes.DATA_BODIES[2]):
-        prepared = shapes.fitted(shapes.read(pose, arguments.data))
-        mesh, targets = prepared.mesh, prepared.mapped[None]
+        fitted = shapes.fitted(shapes.read(pose, arguments.data))
+        mesh, targets = fitted.mesh, fitted.mapped[None]
         packer = Packer(Source("maps", mesh.points, mesh.tets), MODES)
         compressor = Compressor(Codec(mesh, MODES), targets, packer)
         _print_errors(pose.label, compressor)

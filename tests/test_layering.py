@@ -23,6 +23,7 @@ SOLVER_FLOORS = (
     ("surface", "collision", "maps"),
     ("fit", "compression"),
     ("frames",),
+    ("steps",),
     ("api",),
 )
 ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))
@@ -163,6 +164,17 @@ def test_no_circle_of_modules(repository: Path) -> None:
 def test_few_modules_stand_directly_in_the_solver(repository: Path) -> None:
     direct = [path.name for path in (repository / PACKAGE / "solver").glob("*.py")]
     assert len(direct) <= MOST_MODULES, direct
+
+
+def test_the_tests_of_the_solver_do_without_blender(repository: Path) -> None:
+    code = """
+import sys, pytest
+for name in ("bpy", "bmesh", "mathutils", "gpu"):
+    sys.modules[name] = None  # makes importing it an error
+sys.exit(pytest.main(["--collect-only", "-q", "tests/solver"]))
+"""
+    run = subprocess.run([sys.executable, "-c", code], cwd=repository, capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stdout[-2000:]
 
 
 def test_everything_below_the_blender_layer_imports_without_blender(repository: Path) -> None:

@@ -5,24 +5,27 @@
 from __future__ import annotations
 
 import argparse
-import json
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..solver.errors import InputError
 from ..solver.files.atomic import making_folder, replacing_all, require_writable_in
-from ..solver.files.npz import read_pairs, write_arrays
-from ..solver.frames.chain import finish, prepare
+from ..solver.files.npz import write_arrays
+from ..solver.fit.fit_pair import fit_pair
 from ..solver.frames.measures import VertexMeasures
+from ..solver.keys.files import read_pair
 from ..solver.maps.analysis import Analysis
 from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, put_tets, read_tets
 from ..solver.maps.mapping import Mapping
-from .options import add_settings, settings_of
+from ..solver.settings import FitOptions
+from ..solver.support.progress import finish
+from .options import add_options, fit_options, write_json
 from .progress_bars import StageBars
 
 if TYPE_CHECKING:
-    from ..solver.fit.fitted_map import PreparedMap
+    from ..solver.fit.fitted_map import FittedMap
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,14 +43,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
     command.add_argument("--format", choices=("npz", "vtu", "vtk", "msh"), default="npz", help="of mapping.* (npz)")
     command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
-    add_settings(command, frames=False)
+    add_options(command, FitOptions)
     command.set_defaults(run=_run)
 
 
 def _run(arguments: argparse.Namespace) -> None:
     if find_spec("matplotlib") is None:
         raise InputError("The pictures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
-    prepared = None
+    fitted = None
     names = [f"mapping.{arguments.format}", "histograms.png", "slices.png", "summary.json"]
     if (arguments.first is None) != (arguments.last is None):
         raise InputError("Two shapes are needed; give both --from and --to, or neither for a mesh of tetrahedra.")
@@ -57,18 +60,18 @@ def _run(arguments: argparse.Namespace) -> None:
         names += ["surface.npz", "surface.png"]
     require_writable_in(arguments.output, names, [arguments.input, arguments.target])
     if arguments.first is not None:
-        pair = read_pairs(arguments.input, (arguments.first, arguments.last))[0]
+        pair = read_pair(arguments.input, arguments.first, arguments.last)
         with StageBars() as bars:
-            prepared = finish(prepare(pair, settings_of(arguments)), bars)
-        mapping = Mapping(prepared.mesh, prepared.mapped)
+            fitted = finish(fit_pair(pair, fit_options(arguments)), bars)
+        mapping = Mapping(fitted.mesh, fitted.mapped)
     else:
         mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
     analysis = Analysis(mapping)
     with making_folder(arguments.output):
-        _write(analysis, prepared, [arguments.output / name for name in names])
+        _write(analysis, fitted, [arguments.output / name for name in names])
 
 
-def _write(analysis: Analysis, prepared: PreparedMap | None, paths: list[Path]) -> None:
+def _write(analysis: Analysis, fitted: FittedMap | None, paths: list[Path]) -> None:
     from qc3d_paper.drawing.slices import save_histograms, save_slices
     from qc3d_paper.drawing.surfaces import save_distortion
 
@@ -77,17 +80,17 @@ def _write(analysis: Analysis, prepared: PreparedMap | None, paths: list[Path]) 
         put_tets(mapping, _with_attributes(analysis), paths[0])
         save_histograms(analysis, histograms)
         save_slices(analysis, slices)
-        if prepared is not None:
-            pair = prepared.pair
-            measures = VertexMeasures([prepared]).of(0, pair.key1, prepared.mapped)
+        if fitted is not None:
+            pair = fitted.pair
+            measures = VertexMeasures([fitted]).of(0, pair.key1, fitted.mapped)
             summary["surface"] = {
                 "vertices": len(pair.key0),
-                "landmark_residual": prepared.landmark_residual(),
+                "landmark_residual": asdict(fitted.landmark_residual()),
                 **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
             }
             write_arrays(surface[0], {"faces": pair.faces, "key0": pair.key0, "key1": pair.key1, **measures})
             save_distortion(pair, measures, surface[1])
-        text.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        write_json(text, summary)
 
 
 def _with_attributes(analysis: Analysis) -> TetFile:

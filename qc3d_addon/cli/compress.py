@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -25,7 +24,7 @@ from ..solver.maps.boundary_conditions import Conditions
 from ..solver.maps.files import TARGET, TetFile, read_tets, write_tets
 from ..solver.maps.mapping import Mapping
 from . import speech
-from .options import whole_number
+from .options import output_files, whole_number, write_json
 
 _MODES = 300
 
@@ -69,7 +68,7 @@ class _Job(NamedTuple):
 def _compress(arguments: argparse.Namespace) -> None:
     if arguments.error is not None and not 0.0 < arguments.error < np.inf:
         raise InputError(f"The error {arguments.error} is not possible; give a number above 0.")
-    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    files = output_files(arguments)
     require_writable(*files, inputs=[arguments.map, arguments.target])
     job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
     choice = _chosen(job.compressor, arguments)
@@ -78,7 +77,7 @@ def _compress(arguments: argparse.Namespace) -> None:
     with replacing_all(*files) as (output, *report_files):
         output.write_bytes(data)
         for report_file in report_files:
-            report_file.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+            write_json(report_file, report)
     speech.say(
         f"{len(data)} bytes, 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
         f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {choice.error:.2g}, folds "

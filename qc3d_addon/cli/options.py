@@ -1,50 +1,95 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options that several commands have."""
+"""Options and checks that several commands have."""
 
 from __future__ import annotations
 
 import argparse
-from typing import get_args
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
-from ..solver.settings import OF_THE_FIT, Easing, Engine, Mode, Quality, Settings, StretchLaw
+from ..solver.errors import on_one_line
+from ..solver.settings import FitOptions, FrameOptions
+from . import speech
 
-_DEFAULTS = Settings()
-_ALL = ("mode", "easing", *OF_THE_FIT)
+MOST_FRAMES = 10_000
+_HELP = {
+    "mode": "how in-betweens are made",
+    "easing": "how far along the way the in-betweens are",
+    "stretch": "how mode natural interpolates stretches",
+    "engine": "what fills the volume around the mesh",
+    "quality": "how fine the volume is",
+    "extra_turns": "full turns that two shapes cannot tell",
+    "seed": "of the delaunay engine's samples",
+}
+_METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
 
-def add_settings(command: argparse.ArgumentParser, frames: bool = True) -> None:
-    """Add the solver's settings: all of them, or those of the fit alone."""
-    for name, choices, text in (
-        ("mode", get_args(Mode), "how in-betweens are made"),
-        ("stretch", get_args(StretchLaw), "how mode natural interpolates stretches"),
-        ("easing", get_args(Easing), "how far along the way the in-betweens are"),
-        ("engine", get_args(Engine), "what fills the volume around the mesh"),
-        ("quality", get_args(Quality), "how fine the volume is"),
-    ):
-        if not frames and name not in OF_THE_FIT:
-            continue
-        default = getattr(_DEFAULTS, name)
-        command.add_argument(f"--{name}", choices=choices, default=default, help=f"{text} (default: {default})")
+def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions]) -> None:
+    """Add the solver's options: those of the fit, of the frames, or both."""
+    for kind in kinds:
+        defaults, types = kind(), get_type_hints(kind)
+        for name in types:
+            if name not in _HELP:
+                continue
+            default, choices = getattr(defaults, name), get_args(types[name])
+            command.add_argument(
+                f"--{name.replace('_', '-')}",
+                default=default,
+                help=f"{_HELP[name]} (default: {default})",
+                **({"choices": choices} if choices else {"type": whole_number, "metavar": _METAVARS[name]}),
+            )
+
+
+def fit_options(arguments: argparse.Namespace) -> FitOptions:
+    """The options of the fit that were chosen; the others stay at their defaults."""
+    return FitOptions(**_chosen(arguments, FitOptions))
+
+
+def frame_options(arguments: argparse.Namespace) -> FrameOptions:
+    """The options of the frames that were chosen."""
+    return FrameOptions(**_chosen(arguments, FrameOptions))
+
+
+def _chosen(arguments: argparse.Namespace, kind: type[FitOptions | FrameOptions]) -> dict[str, Any]:
+    return {name: getattr(arguments, name) for name in get_type_hints(kind) if hasattr(arguments, name)}
+
+
+def add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents: str) -> None:
+    """Add the keys to go through, the number of in-betweens, and where results go."""
+    command.add_argument("--from", dest="first", required=True, metavar="NAME", help=f"the {kind} to start from")
     command.add_argument(
-        "--extra-turns",
-        type=whole_number,
-        default=_DEFAULTS.extra_turns,
-        metavar="TURNS",
-        help="full turns that two shapes cannot tell (default: 0)",
+        "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; once for each, in order"
     )
+    command.add_argument("--to", dest="last", required=True, metavar="NAME", help=f"the {kind} to end with")
     command.add_argument(
-        "--seed",
-        type=whole_number,
-        default=_DEFAULTS.seed,
-        metavar="S",
-        help="of the delaunay engine's samples (default: 0)",
+        "--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens between every two"
     )
+    command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
+    command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
 
 
-def settings_of(arguments: argparse.Namespace) -> Settings:
-    """The solver's settings that were chosen; the others stay at their defaults."""
-    return Settings(**{name: getattr(arguments, name) for name in _ALL if hasattr(arguments, name)})
+def key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """The keys of ``add_keys`` from the first to the last."""
+    return (arguments.first, *arguments.via, arguments.last)
+
+
+def output_files(arguments: argparse.Namespace) -> list[Path]:
+    """The output, and the report where one is asked for."""
+    return [arguments.output, *([] if arguments.report is None else [arguments.report])]
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print sentences for the user on standard error."""
+    for note in notes:
+        speech.note(on_one_line(note))
+
+
+def write_json(path: Path, values: dict[str, Any]) -> None:
+    """Write a report; raises OSError if it cannot be written."""
+    path.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 def whole_number(text: str) -> int:
@@ -53,3 +98,10 @@ def whole_number(text: str) -> int:
         return int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _frame_count(text: str) -> int:
+    count = whole_number(text)
+    if not 0 <= count <= MOST_FRAMES:
+        raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")
+    return count

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from tqdm import tqdm
 
-    from ..solver.frames.chain import Progress
+    from ..solver.support.progress import Progress
 
 _FORMAT = "{desc:8}{percentage:4.0f}% |{bar:40}| {elapsed}"
 

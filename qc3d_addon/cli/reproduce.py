@@ -77,8 +77,8 @@ def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:
         title, formula = bijections.BIJECTIONS[number]
         return bijections.without_folds(_cube(), title, formula)
     pose = (shapes.DATA_FACES[1], shapes.DATA_BODIES[0], shapes.DATA_BODIES[2])[int(number) - 3]
-    prepared = shapes.fitted(shapes.read(pose, data))
-    return f"the map of {pose.label}", Mapping(prepared.mesh, prepared.mapped)
+    fitted = shapes.fitted(shapes.read(pose, data))
+    return f"the map of {pose.label}", Mapping(fitted.mesh, fitted.mapped)
 
 
 @cache

@@ -4,20 +4,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
-from qc3d_addon.solver.frames.chain import Bake, finish, inbetweens
+from qc3d_addon.solver.api import Fit
+from qc3d_addon.solver.frames.bake import Bake
 from qc3d_addon.solver.frames.measures import worst_excess
+from qc3d_addon.solver.settings import Mode
 
 from ..drawing.sheets import Row, save_sheet, straight_blend
 from . import shapes
 from .caption import Caption
 from .shapes import Pose
 
+MODES: tuple[Mode, ...] = ("linear", "natural")
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _MILD = 0.05  # what an eye forgives: lengths 5 % beyond those of the keys
 _CLAIMS = {
@@ -31,16 +33,16 @@ def draw(number: str, poses: tuple[Pose, ...], data: Path | None, file: BinaryIO
     rows, texts, excesses, folded = [], [], [], 0
     for pose in poses:
         pair = shapes.read(pose, data)
-        prepared = shapes.fitted(pair)
+        fit = Fit(shapes.fitted(pair))
         bakes: dict[str, Bake] = {
-            mode: finish(inbetweens(prepared, TIMES, replace(shapes.SETTINGS, mode=mode)))
-            for mode in ("linear", "natural")
+            mode: fit.inbetweens(TIMES, mode=mode)
+            for mode in MODES
         }
         found = [Row(mode, pair.faces, np.array(TIMES), bake.frames) for mode, bake in bakes.items()]
         found.insert(0, straight_blend(found[0]))
-        excess = [worst_excess(pair, row.frames).ratio for row in found]
+        excess = [worst_excess(pair, row.frames).excess for row in found]
         excesses.append(excess)
-        folds = sum(bakes["linear"].report["folds"]["frames"])
+        folds = sum(bakes["linear"].report.folds.frames or [])
         folded += folds
         texts.append(
             f"{pose.label}: worst edge beyond its lengths in the keys, straight blend {excess[0]:.1%}, linear "

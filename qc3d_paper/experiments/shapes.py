@@ -11,16 +11,17 @@ import numpy as np
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.files.npz import read_pairs
-from qc3d_addon.solver.fit.fitted_map import PreparedMap
-from qc3d_addon.solver.frames.chain import finish, prepare
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.keys.files import read_pair
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.meshing.cube import fill_cube
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 
-SETTINGS = Settings(engine="delaunay", quality="fine")
+OPTIONS = FitOptions(quality="fine")
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 
@@ -56,7 +57,7 @@ def read(pose: Pose, data: Path | None) -> KeyPair:
     if pose.file.endswith(".npz"):
         if data is None:
             raise InputError(f"{pose.file} is no demo file; name its folder.")
-        return read_pairs(data / pose.file, (pose.first, pose.second))[0]
+        return read_pair(data / pose.file, pose.first, pose.second)
     path = ASSETS / pose.file
     if not path.is_file():
         raise InputError(f"The demo file {path} is missing; the experiments run from a checkout of the project.")
@@ -71,15 +72,15 @@ def read(pose: Pose, data: Path | None) -> KeyPair:
     return pair
 
 
-def fitted(pair: KeyPair) -> PreparedMap:
+def fitted(pair: KeyPair) -> FittedMap:
     """The fold-free map of the cube that carries one shape onto the other."""
-    return finish(prepare(pair, SETTINGS))
+    return finish(fit_pair(pair, OPTIONS))
 
 
 def cube() -> TetMesh:
     """The unit cube, finest around a ball in its middle."""
     points, faces = _ball()
-    return fill_cube(points, faces, SETTINGS).mesh
+    return fill_cube(points, faces, OPTIONS).mesh
 
 
 def _ball(rings: int = 16, radius: float = 0.3) -> tuple[Floats, Ints]:

@@ -57,10 +57,10 @@ class Experiment:
 
     def __init__(self, pose: Pose, data: Path | None) -> None:
         self.pose = pose
-        prepared = shapes.fitted(shapes.read(pose, data))
-        self.mapping = Mapping(prepared.mesh, prepared.mapped)
-        self.modes = min(_MODES, len(prepared.mesh.points) - 2)
-        moved = prepared.mapped - prepared.mesh.points
+        fitted = shapes.fitted(shapes.read(pose, data))
+        self.mapping = Mapping(fitted.mesh, fitted.mapped)
+        self.modes = min(_MODES, len(fitted.mesh.points) - 2)
+        moved = fitted.mapped - fitted.mesh.points
         self.reference = float((moved**2).sum(axis=1).mean())
 
     @cached_property

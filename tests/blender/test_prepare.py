@@ -104,7 +104,7 @@ def test_a_damaged_map_is_refused_and_prepare_heals_it(figure: bpy.types.Object,
     bake()
     (name,) = map_properties()
     figure.data.shape_keys[name] = map_properties()[name][:100]
-    with pytest.raises(RuntimeError, match="The stored map is damaged; prepare the keys again"):
+    with pytest.raises(RuntimeError, match="The stored map is damaged; fit the keys again"):
         bake(count=2)
     bpy.ops.qc3d.prepare(**PAIR)
     bake(count=2)

@@ -15,7 +15,7 @@ from qc3d_addon.solver.compression import codec
 from qc3d_addon.solver.compression import search as rate
 from qc3d_addon.solver.maps.files import TARGET, TetFile, read_tets, write_tets
 from qc3d_addon.solver.meshing.cube import fill_cube
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
 
@@ -31,7 +31,7 @@ def _few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def mesh() -> TetMesh:
-    return fill_cube(*shapes._ball(6), Settings(engine="delaunay", quality="normal")).mesh
+    return fill_cube(*shapes._ball(6), FitOptions()).mesh
 
 
 @pytest.fixture

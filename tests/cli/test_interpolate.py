@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from qc3d_addon.cli import interpolate as command
 from qc3d_addon.cli import main
-from qc3d_addon.solver.keys.keypair import KeyPair
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.settings import FitOptions, FrameOptions
 
 QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
@@ -116,20 +117,14 @@ def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkey
     class Reached(Exception):
         pass
 
-    def prepare(pair: KeyPair, settings: Settings) -> None:
-        assert settings == Settings(
-            mode="linear",
-            stretch="logarithmic",
-            easing="ease-in",
-            extra_turns=-2,
-            engine="delaunay",
-            quality="normal",
-            seed=5,
-        )
+    def carry_out(task: Task) -> None:
+        assert task.fit_options == FitOptions(stretch="logarithmic", extra_turns=-2, quality="fine", seed=5)
+        assert task.frame_options == FrameOptions("linear", "ease-in")
         raise Reached
 
-    monkeypatch.setattr(main, "prepare", prepare)
+    monkeypatch.setattr(command, "carry_out", carry_out)
     options = ["--mode", "linear", "--stretch", "logarithmic", "--easing", "ease-in", "--extra-turns", "-2"]
+    options += ["--quality", "fine", "--engine", "delaunay"]
     with pytest.raises(Reached):
         interpolate(bar_file, tmp_path / "frames.npz", *options, "--seed", "5")
 

@@ -32,22 +32,22 @@ if stage == "load":
                 strike()
     sys.meta_path.insert(0, Finder())
 else:
-    from qc3d_addon import cli, progress_bars
-    from qc3d_addon.solver import array_files
+    from qc3d_addon.cli import interpolate, progress_bars
+    from qc3d_addon.solver.keys import files
     if stage == "read":
-        array_files.open_archive = strike
+        files.open_archive = strike
     elif stage == "open":
         import bpy
-        from qc3d_addon.blender import bake
-        bake._open = strike
+        from qc3d_addon.blender.bake import run
+        run._open = strike
     elif stage == "write":
-        cli.write_frames = lambda path, *rest: (path.write_bytes(b"half"), strike())
+        interpolate.write_frames = lambda path, *rest: (path.write_bytes(b"half"), strike())
     elif stage == "save":
-        from qc3d_addon.blender import bake
-        write = bake.write_bake
-        bake.write_bake = lambda *arguments: (write(*arguments), strike())
+        from qc3d_addon.blender.bake import run
+        write = run.write_bake
+        run.write_bake = lambda *arguments: (write(*arguments), strike())
     elif stage == "tables":
-        from qc3d_addon.figures import slices
+        from qc3d_paper.drawing import slices
         slices.save_slices = strike
     else:
         seen = progress_bars.StageBars.__call__

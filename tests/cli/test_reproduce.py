@@ -21,7 +21,7 @@ from qc3d_paper.experiments.caption import Caption
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarse volumes and few modes."""
-    monkeypatch.setattr(shapes, "SETTINGS", shapes.Settings(engine="delaunay", quality="normal"))
+    monkeypatch.setattr(shapes, "OPTIONS", shapes.FitOptions())
     monkeypatch.setattr(spectra, "_MODES", 60)
     monkeypatch.setattr(spectra, "_FITTED_COUNTS", (4, 16))
     monkeypatch.setattr(codec, "_FIRST_ITERATIONS", 5)

@@ -13,67 +13,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 if TYPE_CHECKING:
-    from ...solver.frames.chain import Progress
     from ...solver.frames.task import Outcome, Task
     from ...worker.client import Limits
-
-# What the panel calls each stage, and about how long it takes of a bake of one pair.
-_STAGES = {
-    "mesh": ("Filling the volume", 0.45),
-    "locate": ("Finding the surface in it", 0.02),
-    "fit": ("Fitting the map", 0.28),
-    "factor": ("Preparing the frames", 0.05),
-    "frames": ("Making the frames", 0.2),
-}
-_STAGES_OF_A_MAP = ("mesh", "locate", "fit")
-
-
-class Course:
-    """Turns the progress of a task's stages into one number for all of it.
-
-    Parameters
-    ----------
-    maps
-        How many maps the task makes.
-    frames
-        Whether it makes frames.
-    """
-
-    def __init__(self, maps: int, frames: bool) -> None:
-        self._maps = maps
-        each = sum(_STAGES[stage][1] for stage in _STAGES_OF_A_MAP)
-        rest = sum(weight for stage, (_, weight) in _STAGES.items() if stage not in _STAGES_OF_A_MAP)
-        self._total = maps * each + frames * rest or 1.0
-        self._begun = 0
-        self._last = ""
-        self._done = 0.0
-        self._current = 0.0
-        self.stage = "Starting"
-
-    @property
-    def fraction(self) -> float:
-        """How much of all the work is done, 0..1."""
-        return min((self._done + self._current) / self._total, 1.0)
-
-    def follow(self, progress: Progress) -> None:
-        """Take notice of the newest progress; steps may be left out, but none comes back."""
-        label, weight = _STAGES[progress.stage]
-        if progress.stage != self._last:
-            order = list(_STAGES)
-            if self._last and order.index(progress.stage) < order.index(self._last):
-                self._begun += 1
-            self._last = progress.stage
-            self._done = self._before(progress.stage)
-        self._current = weight * progress.fraction
-        many = self._maps > 1 and progress.stage in _STAGES_OF_A_MAP
-        self.stage = f"{label} ({self._begun + 1} of {self._maps})" if many else label
-
-    def _before(self, stage: str) -> float:
-        each = sum(_STAGES[name][1] for name in _STAGES_OF_A_MAP)
-        if stage in _STAGES_OF_A_MAP:
-            earlier = _STAGES_OF_A_MAP[: _STAGES_OF_A_MAP.index(stage)]
-            return self._begun * each + sum(_STAGES[name][1] for name in earlier)
-        return self._maps * each + (_STAGES["factor"][1] if stage == "frames" else 0.0)
 
 
 class Job:
@@ -89,7 +30,6 @@ class Job:
         from ...worker.client import Worker
 
         self.label = label
-        self.course = Course(task.new_maps, len(task.times) > 0)
         self.is_cancelled = False
         self._started = clock.monotonic()
         self._worker: Any = Worker(task, limits)
@@ -102,9 +42,17 @@ class Job:
 
     def poll(self) -> Outcome | None:
         """The outcome when it is there; raises QC3DError where the work failed."""
-        if self._worker.progress is not None:
-            self.course.follow(self._worker.progress)
         return self._worker.poll()
+
+    @property
+    def stage(self) -> str:
+        """What it does now, in words."""
+        return "Starting" if self._worker.progress is None else self._worker.progress.label
+
+    @property
+    def fraction(self) -> float:
+        """How much of all the work is done, 0..1."""
+        return 0.0 if self._worker.progress is None else self._worker.progress.overall
 
     def at_end(self, call: Callable[[], None]) -> None:
         """Call this when the job ends, in whatever way: Blender drops a running operator without asking it."""

@@ -28,19 +28,20 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
         If the keys were changed since, so that there is no such map any more, or the file cannot be written.
     """
     from ...solver.fit.files import KeptMaps, write_maps
+    from ...solver.frames.modes import needs_fits
 
     keys = checks.require_object(obj).data.shape_keys
     record = Record.read(keys)
-    settings = request_again(obj, chain).settings
-    if settings.mode == "straight":
+    request = request_again(obj, chain)
+    if not needs_fits(request.frame_options.mode):
         raise InputError("A straight blend is made without a map; bake in another mode to have one.")
     maps = {}
     for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
-        data = record.kept_map(keys, kept_map(ends, pair, settings))
+        data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
         if data is None:
             raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is no more that of the keys; re-bake first.")
         maps[ends] = data
-    write_maps(path, KeptMaps(chain.through, settings, maps))
+    write_maps(path, KeptMaps(chain.through, request.fit_options, maps))
     return len(maps)
 
 
@@ -66,6 +67,6 @@ def load_maps(obj: bpy.types.Object, path: Path) -> KeptMaps:
         with naming_pair(*ends, read.through):
             from_bytes(read.maps[ends], pairs[ends])
     for ends, data in read.maps.items():
-        record.keep_map(keys, kept_map(ends, pairs[ends], read.settings), data)
+        record.keep_map(keys, kept_map(ends, pairs[ends], read.options), data)
     record.write(keys)
     return read

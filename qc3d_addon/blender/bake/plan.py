@@ -28,7 +28,7 @@ from .step_choice import chosen_steps
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome, Task
     from ...solver.keys.keypair import KeyPair
-    from ...solver.settings import Settings
+    from ...solver.settings import FitOptions
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     obj = checks.require_object(obj)
     Record.read(obj.data.shape_keys)
     pairs = mesh_data.read_pairs(obj, request.keys)
-    return Plan(request, Task(pairs, request.keys, request.settings), obj.session_uid, obj.name)
+    return Plan(request, Task(pairs, request.keys, request.fit_options), obj.session_uid, obj.name)
 
 
 def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
@@ -105,7 +105,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
         If the object, the keys or the settings cannot be used.
     """
     # Imported where it is used: scipy would make Blender start slower.
-    from ...solver.frames.chain import evenly_spaced
+    from ...solver.frames.bake import evenly_spaced
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
@@ -113,11 +113,11 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     record = Record.read(keys)
     pairs = mesh_data.read_pairs(obj, request.keys)
     shape_keys.require_writable(obj, _chain(obj, record, request), request.keyframes)
-    kept = {ends: record.kept_map(keys, kept_map(ends, pair, request.settings)) for ends, pair in pairs.items()}
+    kept = {ends: record.kept_map(keys, kept_map(ends, pair, request.fit_options)) for ends, pair in pairs.items()}
     usable = {ends: data for ends, data in kept.items() if data is not None}
     times = evenly_spaced(request.intervals - 1)
     collider = colliders.read_colliders(obj, request.colliders, request.keys)
-    task = Task(pairs, request.keys, request.settings, times, usable, collider)
+    task = Task(pairs, request.keys, request.fit_options, request.frame_options, times, usable, collider)
     return Plan(request, task, obj.session_uid, obj.name)
 
 
@@ -144,8 +144,8 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
         If the object or the keys cannot be used any more.
     """
     request = request_again(obj, chain)
-    even = replace(request.settings, easing="linear")
-    plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, settings=even))
+    even = replace(request.frame_options, easing="linear")
+    plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, frame_options=even))
     return replace(plan, request=request)
 
 
@@ -184,7 +184,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
 
     notes = shape_keys.write_chain(obj, chain, shapes, intervals, request.keyframes)
     owner = shape_keys.slider_owner(obj, chain).name
-    notes = [*bake.report["notes"], *notes, *said, *passed, *_values_that_add(keys, request)]
+    notes = [*bake.report.notes, *notes, *said, *passed, *_values_that_add(keys, request)]
     report = {
         "object": obj.name,
         "from": request.keys[0],
@@ -194,7 +194,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         "keys": list(chain.keys.values()),
         "slider": chain.slider,
         "slider_object": owner,
-        **bake.report,
+        **bake.report.as_json(),
         "notes": notes,
     }
     chain.request, chain.mirror_of = request.remembered(), ""
@@ -211,12 +211,11 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     return BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
 
 
-def kept_map(ends: tuple[str, str], pair: KeyPair, settings: Settings) -> KeptMap:
-    """Where the map of a pair is kept that was made with these settings."""
+def kept_map(ends: tuple[str, str], pair: KeyPair, options: FitOptions) -> KeptMap:
+    """Where the map of a pair is kept that was made with these options."""
     from ...solver.fit.storage import fingerprint
 
-    # The mode and the easing are no part of it: one map serves them all.
-    return KeptMap(*ends, f"{fingerprint(pair)} {settings.preparation}")
+    return KeptMap(*ends, f"{fingerprint(pair)} {options.identity}")
 
 
 def _same(pair: KeyPair, read: KeyPair) -> bool:
@@ -224,8 +223,8 @@ def _same(pair: KeyPair, read: KeyPair) -> bool:
 
 
 def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome) -> None:
-    for ends, data in outcome.maps.items():
-        record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.settings), data)
+    for ends, data in outcome.fits.items():
+        record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.fit_options), data)
 
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
@@ -263,7 +262,7 @@ def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[
 
     The steps are even on the slider, also where the way between the keys is eased.
     """
-    along = eased(times, request.settings.easing) * (len(request.keys) - 1)
+    along = eased(times, request.frame_options.easing) * (len(request.keys) - 1)
     met, sentences = {}, []
     for number, name in enumerate(request.keys):
         step = int(np.abs(along - number).argmin())
@@ -271,7 +270,7 @@ def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[
             met[step] = name
         else:
             sentences.append(
-                f"With the easing {request.settings.easing} the slider passes '{name}' between two in-betweens, "
+                f"With the easing {request.frame_options.easing} the slider passes '{name}' between two in-betweens, "
                 f"at {np.interp(number, along, times):.2f}; to meet it, bake with the easing linear and ease the "
                 "slider's keyframes."
             )

@@ -11,8 +11,7 @@ from . import jobs
 
 def draw_bar(layout: bpy.types.UILayout, job: jobs.Job) -> None:
     """A progress bar with the name of the stage in it."""
-    course = job.course
-    layout.progress(text=f"{course.stage}, {course.fraction:.0%}", factor=course.fraction, type='BAR')
+    layout.progress(text=f"{job.stage}, {job.fraction:.0%}", factor=job.fraction, type='BAR')
 
 
 def show(context: bpy.types.Context) -> None:

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from ...solver.errors import InputError
-from ...solver.settings import Settings
+from ...solver.settings import FitOptions, FrameOptions
 from ..store import names
 
 # Frames of every two keys that a tolerance chooses from; it has many divisors.
@@ -28,8 +28,8 @@ class BakeRequest:
         Names of two keys or more, from the first to the last; the same name may come again, but not twice in a row.
     count
         Number of in-betweens between every two keys that follow each other, evenly spaced.
-    settings
-        The solver's settings.
+    fit_options, frame_options
+        The solver's options.
     keyframes
         First and last frame between which the slider goes from 0 to 1, or None to leave it without keyframes.
     tolerance
@@ -41,7 +41,8 @@ class BakeRequest:
 
     keys: tuple[str, ...]
     count: int = 3
-    settings: Settings = field(default_factory=Settings)
+    fit_options: FitOptions = field(default_factory=FitOptions)
+    frame_options: FrameOptions = field(default_factory=FrameOptions)
     keyframes: tuple[int, int] | None = None
     tolerance: float = 0.0
     colliders: str = ""
@@ -70,7 +71,7 @@ class BakeRequest:
         return {
             "count": self.count,
             "tolerance": self.tolerance,
-            "settings": asdict(self.settings),
+            "settings": asdict(self.fit_options) | asdict(self.frame_options),
             "colliders": self.colliders,
         }
 
@@ -84,9 +85,16 @@ class BakeRequest:
             If it is not what this version writes.
         """
         try:
-            settings = Settings(**remembered["settings"])
-            colliders = str(remembered.get("colliders", ""))
-            return cls(keys, int(remembered["count"]), settings, None, float(remembered["tolerance"]), colliders)
+            options = dict(remembered["settings"])
+            frame_options = FrameOptions(**{field.name: options.pop(field.name) for field in fields(FrameOptions)})
+            return cls(
+                keys,
+                int(remembered["count"]),
+                FitOptions(**options),
+                frame_options,
+                tolerance=float(remembered["tolerance"]),
+                colliders=str(remembered.get("colliders", "")),
+            )
         except (KeyError, TypeError, ValueError) as error:
             raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
 

@@ -18,7 +18,7 @@ from .plan import plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 
 if TYPE_CHECKING:
-    from ...solver.frames.chain import Progress
+    from ...solver.support.progress import Progress
 
 _SIZE_OF_OPEN_FILE = 4  # times the file that was opened, which may be compressed, with what the bake adds besides keys
 
@@ -38,9 +38,9 @@ def bake_object(
         If the object, the keys or the settings cannot be used; the object is as it was.
     """
     # Imported where it is used: scipy would make Blender start slower.
-    from ...solver.frames.chain import finish
     from ...solver.frames.task import carry_out
     from ...solver.support.memory import machine_limit_mb
+    from ...solver.support.progress import finish
 
     plan = plan_bake(obj, request)
     plan.task.require_memory(machine_limit_mb())

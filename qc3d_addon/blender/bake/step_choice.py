@@ -13,7 +13,7 @@ from ..store.records import Chain
 from .request import BakeRequest
 
 if TYPE_CHECKING:
-    from ...solver.frames.chain import Bake
+    from ...solver.frames.bake import Bake
 
 
 def chosen_steps(bake: Bake, request: BakeRequest, chain: Chain) -> tuple[NDArray[np.int64], list[str]]:

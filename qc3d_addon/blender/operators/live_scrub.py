@@ -47,7 +47,7 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
 
         chain = chosen_chain(plan.find_object(), self.slider)
         pairs = len(plan.request.keys) - 1
-        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.settings.easing))
+        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.frame_options.easing))
         return [f"Drag the slider '{chain.slider}': it shows every moment now."]
 
     def _switched_off(self, context: bpy.types.Context) -> set[str] | None:

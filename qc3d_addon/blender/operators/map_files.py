@@ -74,7 +74,7 @@ class QC3D_OT_load_map(bpy.types.Operator):
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
         # A map serves bakes with the choices it was made with; the panel shows them from now on.
-        fill_panel(obj.qc3d, loaded.through, loaded.settings)
+        fill_panel(obj.qc3d, loaded.through, loaded.options)
         names = " to ".join(f"'{name}'" for name in loaded.through)
         self.report({'INFO'}, f"The map from {names} is ready; the panel has its choices.")
         return {'FINISHED'}

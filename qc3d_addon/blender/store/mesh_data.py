@@ -5,21 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.errors import InputError, naming_pair
+from ...solver.errors import InputError
 from . import checks
 
 if TYPE_CHECKING:
-    from ...solver.keys.keypair import KeyPair
-
-
-Ends = tuple[str, str]
+    from ...solver.keys.keypair import Ends, KeyPair
 
 
 def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPair]:
@@ -30,16 +26,11 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPai
     InputError
         If they are not shape keys of the mesh, or their coordinates cannot be used.
     """
-    from ...solver.keys.keypair import KeyPair
+    from ...solver.keys.keypair import consecutive_pairs
 
     checks.require_keys(obj.data.shape_keys, names)
     coordinates = {name: key_coordinates(obj, name) for name in names}
-    faces, edges = triangles(obj.data), wire_edges(obj.data)
-    pairs = {}
-    for ends in pairwise(names):
-        with naming_pair(*ends, names):
-            pairs[ends] = KeyPair.checked(coordinates[ends[0]], coordinates[ends[1]], faces, edges)
-    return pairs
+    return consecutive_pairs(coordinates, triangles(obj.data), wire_edges(obj.data), names)
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:

@@ -45,7 +45,7 @@ class TriangleTree:
     """
 
     def __init__(self, faces: Ints, shapes: Sequence[Floats], moving: Bools) -> None:
-        self.order = _halving_order(np.concatenate([shape[faces].mean(axis=1).T for shape in shapes]))
+        self.order = halving_order(np.concatenate([shape[faces].mean(axis=1).T for shape in shapes]))
         self._moves = [moving[self.order]]
         touching = self._concerned(_around_vertices(faces[self.order]), self._moves[0])
         self._apart: list[Pairs] = []
@@ -148,7 +148,7 @@ def _around_vertices(faces: Ints) -> Pairs:
     return _unique(np.concatenate(firsts), np.concatenate(seconds), len(faces))
 
 
-def _halving_order(places: Floats) -> Ints:
+def halving_order(places: Floats) -> Ints:
     """(m,) items so ordered that every node of the tree holds what is on one side of its parent's longest extent.
 
     ``places`` (d, m) are coordinates in as many dimensions as one likes.

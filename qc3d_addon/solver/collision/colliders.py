@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that in-betweens must not touch, and how far from them every vertex has to stay."""
+"""Colliders: surfaces that in-betweens must not touch, and how far from them every vertex has to stay."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,12 +14,14 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
 from ..keys.keypair import KeyPair
 from ..triangles.topology import sides
-from .crossings import crossing_pairs
+from .crossings import CrossingSearch
 from .surface_distance import SurfaceDistance
 
 # A vertex keeps at most this part of the mesh's mean edge from a collider, however far its keys are from it: enough for
 # the flat triangles between vertices.
 _CLEARANCE = 0.25
+# Pushed out of one part of a collider, a vertex may be too near to another; seldom more often than this.
+_PUSHES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +67,28 @@ class Collider:
         faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
         return cls(np.concatenate([part.shapes for part in parts], axis=1), np.concatenate(faces))
 
+    def at_keys(self, count: int) -> Collider:
+        """The collider for a chain of so many keys: one that is given once stays where it is.
+
+        Raises
+        ------
+        InputError
+            If it is given at another number of keys.
+        """
+        if len(self.shapes) == 1:
+            return Collider(np.repeat(self.shapes, count, axis=0), self.faces)
+        if len(self.shapes) != count:
+            raise InputError(f"A collider is given at {len(self.shapes)} keys; give it once, or at all {count} keys.")
+        return self
+
     @property
     def moves(self) -> bool:
         """Whether it is not the same at every key."""
         return not bool((self.shapes == self.shapes[0]).all())
 
-    def pairs(self) -> list[KeyPair]:
-        """The collider as consecutive pairs of keys, to make its own in-betweens; raises InputError where it cannot."""
-        return [KeyPair.checked(first, second, self.faces) for first, second in pairwise(self.shapes)]
 
 
-class Obstacle:
+class PosedCollider:
     """A collider at the times of some frames of a chain.
 
     Parameters
@@ -99,19 +110,15 @@ class Obstacle:
         """Distances from the collider in a frame."""
         return self._distances(self._frames[index])
 
-    def crossings(self, index: int, positions: Floats, faces: Ints) -> int:
-        """Pairs of triangles, one of a mesh (n, 3) and one of the collider, that cross in a frame."""
-        together = np.concatenate([positions, self._frames[index]])
-        pairs = crossing_pairs(together, np.concatenate([faces, self._collider.faces + len(positions)]))
-        return int(np.count_nonzero((pairs < len(faces)).sum(axis=1) == 1))
-
-    def report(self, frames: Floats, faces: Ints, notes: list[str]) -> dict[str, Any]:
-        """``collider_crossings`` of the frames (k, n, 3), and the notes with a sentence where there are any."""
-        counts = [self.crossings(index, frame, faces) for index, frame in enumerate(frames)]
-        if any(counts):
-            worst = int(np.argmax(counts))
-            notes = [*notes, f"Frame {worst} crosses the colliders in {counts[worst]} pairs of triangles."]
-        return {"collider_crossings": counts, "notes": notes}
+    def crossings(self, frames: Floats, faces: Ints) -> list[int]:
+        """For each frame (k, n, 3) the pairs of triangles, one of the mesh and one of the collider, that cross."""
+        if not len(frames):
+            return []
+        together = np.concatenate([faces, self._collider.faces + frames.shape[1]])
+        is_mesh = np.arange(len(together)) < len(faces)
+        shapes = [np.concatenate(both) for both in zip(frames, self._frames, strict=True)]
+        search = CrossingSearch(together, (shapes[0], shapes[-1]), is_mesh, is_mesh)
+        return [len(search.pairs(shape)) for shape in shapes]
 
     def _distances(self, shape: Floats) -> SurfaceDistance:
         if self._last is None or not np.array_equal(self._last[0], shape):
@@ -119,26 +126,26 @@ class Obstacle:
         return self._last[1]
 
 
-class Guard:
-    """Keeps the frames of one pair of keys off an obstacle.
+class CollisionResolver:
+    """Resolves collisions of the frames of one pair of keys with a collider.
 
-    A vertex keeps what its keys keep from the obstacle, interpolated, but never more than the flat triangles between
-    vertices need. One that a key itself has inside is let in as far as that.
+    A vertex keeps the distance that its keys keep from the collider, interpolated, but never more than the flat
+    triangles between vertices need. One that a key itself has inside is let in as far as that.
 
     Parameters
     ----------
-    obstacle : Obstacle
+    collider : PosedCollider
     pair : KeyPair
     number : int
         Number of the pair in the chain.
     members : (j,)
-        Which of the obstacle's frames the pair has.
+        Which of the posed collider's frames the pair has.
     """
 
-    def __init__(self, obstacle: Obstacle, pair: KeyPair, number: int, members: Ints) -> None:
-        self._obstacle, self._members = obstacle, members
+    def __init__(self, collider: PosedCollider, pair: KeyPair, number: int, members: Ints) -> None:
+        self._collider, self._members = collider, members
         self._kept = [
-            obstacle.at_key(number + end).nearest(key)[0] for end, key in enumerate((pair.key0, pair.key1))
+            collider.at_key(number + end).nearest(key)[0] for end, key in enumerate((pair.key0, pair.key1))
         ]
         edges = sides(pair.faces)
         lengths = np.linalg.norm(pair.key0[edges[:, 0]] - pair.key0[edges[:, 1]], axis=1)
@@ -148,6 +155,16 @@ class Guard:
     def pushed(self, index: int, positions: Floats, time: float) -> tuple[Bools, Floats]:
         """Which vertices (n, 3) of the pair's frame ``index`` are too near, and positions where they are not."""
         wanted = np.minimum((1.0 - time) * self._kept[0] + time * self._kept[1], self._most)
-        found, place, normal = self._obstacle.at(int(self._members[index])).nearest(positions)
+        found, place, normal = self._collider.at(int(self._members[index])).nearest(positions)
         near = found < wanted - self._rounding
         return near, np.where(near[:, None], place + wanted[:, None] * normal, positions)
+
+    def cleared(self, index: int, positions: Floats, time: float, still: Bools) -> Floats:
+        """Positions (n, 3) of a frame with every vertex but the ``still`` ones (n,) pushed out, each by itself."""
+        for _ in range(_PUSHES):
+            near, moved = self.pushed(index, positions, time)
+            near &= ~still
+            if not near.any():
+                break
+            positions = np.where(near[:, None], moved, positions)
+        return positions

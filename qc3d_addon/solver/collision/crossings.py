@@ -26,9 +26,13 @@ class CrossingSearch:
         Shapes that the surface takes, such as its two keys: the search is quick near these.
     moving : (m,) bool, optional
         Only pairs are looked for of which at least one triangle is among these.
+    sides : (m,) bool, optional
+        Which of two surfaces each triangle belongs to: only pairs across both are looked for.
     """
 
-    def __init__(self, faces: Ints, shapes: Sequence[Floats], moving: Bools | None = None) -> None:
+    def __init__(
+        self, faces: Ints, shapes: Sequence[Floats], moving: Bools | None = None, sides: Bools | None = None
+    ) -> None:
         self._count = len(faces)
         moving = np.ones(self._count, dtype=bool) if moving is None else moving
         self._tree = TriangleTree(faces, shapes, moving) if self._count > 1 and moving.any() else None
@@ -36,6 +40,7 @@ class CrossingSearch:
             self._order = self._tree.order
             self._faces = faces[self._order]
             self._corners = np.ascontiguousarray(self._faces.T)
+            self._sides = None if sides is None else sides[self._order]
 
     def pairs(self, points: Floats) -> Ints:
         """Pairs of triangles that share no vertex and cross in the shape ``points`` (n, 3); touching does not count.
@@ -52,6 +57,9 @@ class CrossingSearch:
         depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
         codes = []
         for first, second in self._tree.meeting(low, high):
+            if self._sides is not None:
+                across = self._sides[first] != self._sides[second]
+                first, second = first[across], second[across]
             apart = ~_share_a_vertex(self._faces[first], self._faces[second])
             first, second = first[apart], second[apart]
             crossing = _cross(corners[:, :, first], corners[:, :, second], depth)

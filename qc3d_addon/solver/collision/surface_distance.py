@@ -4,22 +4,24 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
 from ..numerics.grouped_sums import sums_by_label
-from ..triangles.geometry import face_normals
+from ..triangles.geometry import areas, face_normals
+from ..triangles.topology import sides, welded
+from .box_tree import halving_order
 
-# Triangles are found by the nearest of their samples: so many candidates for each point.
-_CANDIDATES = 12
-# Samples of a triangle are no farther apart than so many median edges of the mesh.
-_SPACING = 1.5
-_MOST_SAMPLES = 400_000
+# Every node of the tree of triangles has so many children.
+_FAN = 4
+# Points that are worked on at once, so that what belongs to them stays in the processor's cache.
+_BLOCK = 1_000
 
 
 class SurfaceDistance:
-    """Distances from one triangle mesh.
+    """Exact distances from one triangle mesh.
 
     Parameters
     ----------
@@ -29,12 +31,27 @@ class SurfaceDistance:
     """
 
     def __init__(self, points: Floats, faces: Ints) -> None:
+        # Where copies of a vertex meet, the triangles of all of them decide which side is outside.
+        vertices, group = welded(points, points)
+        points, faces = points[vertices], group[faces]
+        faces = faces[areas(points, faces) > 0.0]
+        corners = points[faces]
+        centers = corners.mean(axis=1)
+        # Large triangles get branches of their own: among small ones they would spoil the bounds.
+        radii = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+        faces = faces[halving_order(np.column_stack([centers, radii]).T)]
         normals = face_normals(points, faces)
-        faces = faces[np.linalg.norm(normals, axis=1) > 0.0]
         self._points, self._faces = points, faces
-        self._normals = _vertex_normals(points, faces)
-        samples, self._owners = _samples(points, faces)
-        self._tree = cKDTree(samples)
+        self._face_normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self._vertex_normals = _vertex_normals(points, faces, self._face_normals)
+        edges = sides(faces)
+        self._edge_of_side = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True)[1].reshape(3, -1)
+        self._edge_normals = sums_by_label(self._edge_of_side.ravel(), np.tile(self._face_normals, (3, 1)))
+        corners, normals = np.ascontiguousarray(points[faces].transpose(2, 1, 0)), np.ascontiguousarray(normals.T)
+        size, self._levels = 1, [_Slabs.around(corners, normals, 1)]
+        while self._levels[0].middles.shape[1] > 1:
+            size *= _FAN
+            self._levels.insert(0, _Slabs.around(corners, normals, size))
 
     def nearest(self, queries: Floats) -> tuple[Floats, Floats, Floats]:
         """Where points (q, 3) are.
@@ -42,60 +59,130 @@ class SurfaceDistance:
         Returns
         -------
         distance : (q,)
-            Positive outside, negative inside.
+            Positive outside, negative inside. The side is that of the angle-weighted pseudonormal of the nearest face,
+            edge or vertex, which is right on every closed surface (Baerentzen & Aanaes 2005, "Signed distance
+            computation using the angle weighted pseudonormal").
         place : (q, 3)
             The nearest point of the surface.
         normal : (q, 3)
-            The surface's unit normal there, angle-weighted and interpolated between vertices (after Baerentzen & Aanaes
-            2005, "Signed distance computation using the angle weighted pseudonormal").
+            The surface's unit normal there, interpolated between vertices.
         """
-        count = min(_CANDIDATES, len(self._owners))
-        near = self._tree.query(queries, k=count)[1].reshape(len(queries), count)
-        candidates = self._owners[near]
-        corners = self._points[self._faces[candidates]]
-        weights = _closest_weights(queries[:, None], corners)
-        places = np.einsum("qkc,qkci->qki", weights, corners)
-        squares = ((places - queries[:, None]) ** 2).sum(axis=2)
-        rows, best = np.arange(len(queries)), squares.argmin(axis=1)
-        place = places[rows, best]
-        triangle, weight = candidates[rows, best], weights[rows, best]
-        normal = np.einsum("qc,qci->qi", weight, self._normals[self._faces[triangle]])
+        triangle, weight = np.empty(len(queries), dtype=np.int64), np.empty((len(queries), 3))
+        for start in range(0, len(queries), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            triangle[block], weight[block] = self._closest(queries[block])
+        corners = self._faces[triangle]
+        place = np.einsum("qc,qci->qi", weight, self._points[corners])
+        normal = np.einsum("qc,qci->qi", weight, self._vertex_normals[corners])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        side = np.where(np.einsum("qi,qi->q", normal, queries - place) < 0.0, -1.0, 1.0)
-        return side * np.sqrt(squares[rows, best]), place, normal
+        apart = queries - place
+        side = np.einsum("qi,qi->q", self._pseudonormals(triangle, weight), apart)
+        return np.where(side < 0.0, -1.0, 1.0) * np.linalg.norm(apart, axis=1), place, normal
+
+    def _closest(self, queries: Floats) -> tuple[Ints, Floats]:
+        """The triangle (q,) nearest to each query (q, 3), and the barycentric weights (q, 3) of the nearest point.
+
+        Down the tree, level by level, nodes that are surely farther than others are left out.
+        """
+        places = np.ascontiguousarray(queries.T)
+        query, node = np.arange(len(queries)), np.zeros(len(queries), dtype=np.int64)
+        farthest = np.full(len(queries), np.inf)
+        for level in self._levels:
+            if level is not self._levels[0]:
+                query = np.repeat(query, _FAN)
+                node = (_FAN * node[:, None] + np.arange(_FAN)).ravel()
+                exist = node < level.middles.shape[1]
+                query, node = query[exist], node[exist]
+            nearer, farther = level.bounds(places[:, query], node)
+            firsts = np.flatnonzero(np.diff(query, prepend=-1))
+            farthest = np.minimum(farthest, np.minimum.reduceat(farther, firsts))
+            kept = nearer <= farthest[query]
+            query, node = query[kept], node[kept]
+        corners = self._points[self._faces[node]]
+        weights = _closest_weights(queries[query], corners)
+        squares = ((np.einsum("kc,kci->ki", weights, corners) - queries[query]) ** 2).sum(axis=1)
+        best = np.lexsort((node, squares, query))
+        best = best[np.flatnonzero(np.diff(query[best], prepend=-1))]
+        return node[best], weights[best]
+
+    def _pseudonormals(self, triangles: Ints, weights: Floats) -> Floats:
+        """(q, 3) normals of the face, edge or vertex that a point with these barycentric weights lies on."""
+        normals: Floats = self._face_normals[triangles]
+        is_zero = weights == 0.0
+        for corner in range(3):
+            # Across from the corner is the side from the next corner on.
+            rows = np.flatnonzero(is_zero[:, corner])
+            normals[rows] = self._edge_normals[self._edge_of_side[(corner + 1) % 3, triangles[rows]]]
+        for corner in range(3):
+            rows = np.flatnonzero(is_zero[:, corner - 1] & is_zero[:, corner - 2])
+            normals[rows] = self._vertex_normals[self._faces[triangles[rows], corner]]
+        return normals
 
 
-def _vertex_normals(points: Floats, faces: Ints) -> Floats:
-    """(c, 3) unit normals of the vertices, each triangle weighted by its angle there."""
+class _Slabs(NamedTuple):
+    """Flat cylinders around groups of neighbouring triangles: what is nearly flat is bounded closely, however it lies.
+
+    Component-major, so that inner loops are contiguous: ``middles`` and ``axes`` are (3, k), ``radii`` and ``heights``
+    (half of them) (k,), ``members`` (3, k) a point of the surface in each.
+    """
+
+    middles: Floats
+    axes: Floats
+    radii: Floats
+    heights: Floats
+    members: Floats
+
+    @classmethod
+    def around(cls, corners: Floats, normals: Floats, size: int) -> _Slabs:
+        """Around every ``size`` triangles that follow each other, by their corners (3, 3, f), the coordinate first, and
+        their normals (3, f)."""
+        count = corners.shape[2]
+        starts = np.arange(0, count, size)
+        group = np.arange(count) // size
+        axes = np.add.reduceat(normals, starts, axis=1)
+        length = np.sqrt((axes**2).sum(axis=0))
+        axes = np.where(length > 0.0, axes / np.maximum(length, 1e-300), np.array([[0.0], [0.0], [1.0]]))
+        low, high = _extremes(corners.transpose(1, 0, 2), starts)
+        middles = 0.5 * (low + high)
+        offsets = corners - middles[:, None, group]
+        (x, y, z), (u, v, w) = offsets, axes[:, group]
+        along = x * u + y * v + z * w
+        lowest, highest = _extremes(along, starts)
+        across = np.sqrt(_extremes(np.maximum(x * x + y * y + z * z - along * along, 0.0), starts)[1])
+        # A little more than needed, so that rounding leaves nothing out.
+        slack = 1e-9 * (across + highest - lowest)
+        members = corners[:, :, starts + np.diff(starts, append=count) // 2].mean(axis=1)
+        middles = middles + 0.5 * (lowest + highest) * axes
+        return cls(middles, axes, across + slack, 0.5 * (highest - lowest) + slack, members)
+
+    def bounds(self, queries: Floats, node: Ints) -> tuple[Floats, Floats]:
+        """(k,) squared distances that the nearest point in a node is not below, and not above, for queries (3, k)."""
+        x, y, z = queries - self.middles[:, node]
+        u, v, w = self.axes[:, node]
+        along = x * u + y * v + z * w
+        across = np.sqrt(np.maximum(x * x + y * y + z * z - along * along, 0.0))
+        beyond = np.maximum(np.abs(along) - self.heights[node], 0.0)
+        beside = np.maximum(across - self.radii[node], 0.0)
+        x, y, z = queries - self.members[:, node]
+        return beyond * beyond + beside * beside, x * x + y * y + z * z
+
+
+def _extremes(values: Floats, starts: Ints) -> tuple[Floats, Floats]:
+    """(..., k) least and largest of three rows of values (3, ..., f) in each group of columns."""
+    first, second, third = values
+    least, most = np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
+    return np.minimum.reduceat(least, starts, axis=-1), np.maximum.reduceat(most, starts, axis=-1)
+
+
+def _vertex_normals(points: Floats, faces: Ints, normals: Floats) -> Floats:
+    """(c, 3) unit normals of the vertices, each triangle's unit normal (f, 3) weighted by its angle there."""
     corners = points[faces]
-    unit = face_normals(points, faces)
-    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     total = np.zeros_like(points)
     for corner in range(3):
         along, across = corners[:, (corner + 1) % 3] - corners[:, corner], corners[:, corner - 1] - corners[:, corner]
         angles = np.arctan2(np.linalg.norm(np.cross(along, across), axis=1), np.einsum("fi,fi->f", along, across))
-        total += sums_by_label(faces[:, corner], angles[:, None] * unit, len(points))
+        total += sums_by_label(faces[:, corner], angles[:, None] * normals, len(points))
     return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
-
-
-def _samples(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Points on the triangles, and whose they are: centroids, and a grid on triangles much larger than most."""
-    corners = points[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    spacing = _SPACING * float(np.median(longest))
-    parts = np.ceil(longest / spacing).astype(np.int64)
-    while int((parts * (parts + 1) // 2).sum()) > max(_MOST_SAMPLES, len(faces)):
-        parts = np.maximum(parts // 2, 1)
-    samples, owners = [], []
-    for part in np.unique(parts):
-        rows = np.flatnonzero(parts == part)
-        first, second = np.divmod(np.arange(part * part), part)
-        kept = first + second < part
-        weights = np.stack([first[kept] + 1.0 / 3.0, second[kept] + 1.0 / 3.0], axis=1) / part
-        weights = np.column_stack([weights, 1.0 - weights.sum(axis=1)])
-        samples.append(np.einsum("sc,fci->fsi", weights, corners[rows]).reshape(-1, 3))
-        owners.append(np.repeat(rows, len(weights)))
-    return np.concatenate(samples), np.concatenate(owners)
 
 
 def _closest_weights(queries: Floats, corners: Floats) -> Floats:

@@ -17,6 +17,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from ..arrays import Floats
+from ..errors import ReconstructionError
 from ..maps.boundary_conditions import Conditions
 from ..maps.representation import from_upper_triangle, upper_triangle
 from ..numerics.assembly import StiffnessPattern, stiffness_elements
@@ -62,22 +63,35 @@ class NearestMap:
             How far the coefficients of each mode move for the same change of the map.
         target : (n, 3)
         iterations : int
-            At most so many steps.
+            At most so many steps. The search ends earlier, at the nearest map that it has seen, where it comes to one
+            that conjugate gradients do not solve for.
+
+        Raises
+        ------
+        ReconstructionError
+            If the map of ``start`` itself cannot be solved for.
         """
         search = _Search(self, at_tets, scales, target)
-        found = minimize(
-            search.value_and_gradient,
-            (start / scales[:, None]).ravel(),
-            jac=True,
-            method="L-BFGS-B",
-            options={"maxiter": iterations, "maxcor": _CORRECTIONS},
-        )
-        return np.asarray(np.reshape(found.x, (len(scales), 6)) * scales[:, None])
+        try:
+            nearest = minimize(
+                search.value_and_gradient,
+                (start / scales[:, None]).ravel(),
+                jac=True,
+                method="L-BFGS-B",
+                options={"maxiter": iterations, "maxcor": _CORRECTIONS},
+            ).x
+        except ReconstructionError:
+            if search.nearest is None:
+                raise
+            nearest = search.nearest
+        return np.asarray(np.reshape(nearest, (len(scales), 6)) * scales[:, None])
 
 
 class _Search:
     def __init__(self, problem: NearestMap, at_tets: Floats, scales: Floats, target: Floats) -> None:
         self._problem, self._at_tets, self._scales, self._target = problem, at_tets, scales, target
+        self.nearest: Floats | None = None
+        self._nearest_distance = np.inf
         self._pattern = StiffnessPattern(problem.mesh.tets, len(problem.mesh.points))
         given = problem.conditions
         self._values = np.where(given.held, given.values, problem.mesh.points)
@@ -105,22 +119,27 @@ class _Search:
         slope = _through_exponential(0.5 * (slope + slope.transpose(0, 2, 1)), exponents, axes)
         slope = np.einsum("mii->m", slope)[:, None, None] * np.eye(3) - 2.0 * slope
         gradient = self._at_tets.T @ (upper_triangle(slope) * NORM) * self._scales[:, None]
-        return float((missed**2).sum()) / self._unit, 2.0 / self._unit * gradient.ravel()
+        distance = float((missed**2).sum()) / self._unit
+        if distance < self._nearest_distance:
+            self.nearest, self._nearest_distance = numbers.copy(), distance
+        return distance, 2.0 / self._unit * gradient.ravel()
 
     def _solve(self, matrix: csr_array, values: Floats, loads: Floats) -> None:
-        """Solve for the free values in place, beginning where they are."""
+        """Solve for the free values in place, beginning where they are; raises ReconstructionError if that fails."""
         for coordinate in range(3):
             free = ~self._problem.conditions.held[:, coordinate]
             inner = matrix[free][:, free]
             load = (loads[:, coordinate] - matrix @ np.where(free, 0.0, values[:, coordinate]))[free]
-            values[free, coordinate] = cg(
+            values[free, coordinate], status = cg(
                 inner,
                 load,
                 x0=values[free, coordinate],
                 rtol=_TOLERANCE,
                 maxiter=_MOST_ITERATIONS,
                 M=diags_array(1.0 / inner.diagonal()),
-            )[0]
+            )
+            if status != 0:
+                raise ReconstructionError("A map near the one that is compressed is too distorted to be rebuilt.")
 
 
 def _through_exponential(slope: Floats, exponents: Floats, axes: Floats) -> Floats:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys and frames as .npz files, read without trusting them."""
+"""Archives of arrays, read without trusting them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import stat
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,66 +19,11 @@ from numpy.lib import format as npy_format
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from ..arrays import Floats
-from ..errors import InputError, naming_pair, reason, remedy_of_limit
-from ..keys.keypair import KeyPair
+from ..errors import InputError, reason, remedy_of_limit
 
 # All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd shapes.
 _UNREADABLE = (OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
 MOST_BYTES = 2**31  # of a file that is read, and of an array in it
-
-
-def read_pairs(path: Path, names: Sequence[str]) -> list[KeyPair]:
-    """Read shapes of one mesh: a pair for every two of ``names`` that follow each other.
-
-    Parameters
-    ----------
-    path : Path
-        An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
-        of the names. Other arrays are not looked at; pickled objects are refused.
-    names : sequence of str
-        Names of two shapes or more, no name twice in a row.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys.
-    """
-    for first, second in pairwise(names):
-        if first == second and len(names) == 2:
-            raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
-        if first == second:
-            raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
-    with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
-        shape_names = read_array(archive, "shape_names", path)
-        if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
-            raise InputError(f"shape_names in {path} must be a list of texts, a name for each shape.")
-        known = shape_names.tolist()
-        for name in names:
-            if name not in known:
-                raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
-        keys = {name: read_array(archive, f"V{known.index(name)}", path) for name in names}
-        faces = read_array(archive, "faces", path)
-    for name, key in keys.items():
-        if key.dtype.kind not in "fiu":
-            raise InputError(f"The shape {name!r} in {path} holds {key.dtype} values; coordinates must be numbers.")
-    pairs = []
-    for first, second in pairwise(names):
-        with naming_pair(first, second, names):
-            pairs.append(KeyPair.checked(keys[first], keys[second], faces))
-    return pairs
-
-
-def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats) -> None:
-    """Write frames (k, n, 3) at ``times`` (k,) with the faces, the first and the last key of the pairs, compressed.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
-    write_arrays(path, {"faces": pairs[0].faces, "frames": frames, "times": times, **ends})
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The prepared maps of a row of keys as one file: for another copy of the same mesh, which then need not be fitted.
+"""The fitted maps of a row of keys as one file: for another copy of the same mesh, which then need not be fitted.
 
 A file is a magic word, a version, a header in JSON and the maps as ``storage.to_bytes`` makes them. Nothing in it is
 the name of a file, or run.
@@ -18,11 +18,12 @@ from typing import Any
 from ..errors import InputError
 from ..files.atomic import replacing
 from ..files.npz import require_file, unreadable
-from ..settings import OF_THE_FIT, Settings
+from ..settings import FitOptions
 
 _FIXED = struct.Struct("<8sHI")  # magic, version, bytes of the header
 _MAGIC, _VERSION = b"QC3DMAPS", 1
 _MOST_HEADER = 2**20
+_OPTIONS = ("stretch", "extra_turns", "engine", "quality", "seed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +34,14 @@ class KeptMaps:
     ----------
     through : tuple of str
         Names of the keys, from the first to the last.
-    settings : Settings
+    options : FitOptions
         What the maps were made with.
     maps : dict
         A stored map by the names of its two keys, for every two that follow each other.
     """
 
     through: tuple[str, ...]
-    settings: Settings
+    options: FitOptions
     maps: dict[tuple[str, str], bytes]
 
 
@@ -49,7 +50,7 @@ def write_maps(path: Path, kept: KeptMaps) -> None:
     ends = list(dict.fromkeys(pairwise(kept.through)))
     header = {
         "through": kept.through,
-        "settings": {name: getattr(kept.settings, name) for name in OF_THE_FIT},
+        "settings": {name: getattr(kept.options, name) for name in _OPTIONS},
         "sizes": [len(kept.maps[pair]) for pair in ends],
     }
     text = json.dumps(header).encode()
@@ -80,7 +81,7 @@ def read_maps(path: Path) -> KeptMaps:
     if length > min(_MOST_HEADER, len(data) - _FIXED.size):
         raise InputError(f"{path} is damaged: it ends too early; save the map again.")
     body = data[_FIXED.size + length :]
-    through, settings, sizes = _header(data[_FIXED.size : _FIXED.size + length], path)
+    through, options, sizes = _header(data[_FIXED.size : _FIXED.size + length], path)
     ends = list(dict.fromkeys(pairwise(through)))
     if len(sizes) != len(ends) or min(sizes) < 0 or sum(sizes) != len(body):
         raise InputError(f"{path} is damaged: the sizes of its maps do not fit; save the map again.")
@@ -88,14 +89,14 @@ def read_maps(path: Path) -> KeptMaps:
     for pair, size in zip(ends, sizes, strict=True):
         maps[pair] = body[start : start + size]
         start += size
-    return KeptMaps(through, settings, maps)
+    return KeptMaps(through, options, maps)
 
 
-def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], Settings, list[int]]:
+def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], FitOptions, list[int]]:
     try:
         header: dict[str, Any] = json.loads(text)
         through, sizes, chosen = header["through"], header["sizes"], header["settings"]
-        settings = Settings(**{name: chosen[name] for name in OF_THE_FIT})
+        options = FitOptions(**{name: chosen[name] for name in _OPTIONS})
     except (ValueError, KeyError, TypeError, RecursionError, InputError) as error:
         raise InputError(f"{path} is damaged: its header cannot be read; save the map again.") from error
     sound = (
@@ -103,9 +104,9 @@ def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], Settings, list[in
         and len(through) >= 2
         and all(isinstance(name, str) for name in through)
         and isinstance(sizes, list)
-        and all(type(number) is int for number in (*sizes, settings.seed, settings.extra_turns))
-        and settings.seed < 2**31
+        and all(type(number) is int for number in sizes)
+        and options.seed < 2**31
     )
     if not sound:
         raise InputError(f"{path} is damaged: its header makes no sense; save the map again.")
-    return tuple(through), settings, sizes
+    return tuple(through), options, sizes

@@ -14,7 +14,7 @@ from ..arrays import Floats
 from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
-from ..settings import StretchLaw
+from ..settings import FitOptions
 from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
@@ -25,8 +25,24 @@ from .fold_repair import covered
 _REPAIR_ITERATIONS = 15
 
 
+@dataclass(frozen=True)
+class Residual:
+    """How far a fitted map leaves the vertices from the second key, over the bounding-box diagonal.
+
+    Parameters
+    ----------
+    rms
+        Root of the mean square, weighted by the areas around the vertices.
+    max
+        The worst vertex.
+    """
+
+    rms: float
+    max: float
+
+
 @dataclass(frozen=True, eq=False)
-class PreparedMap:
+class FittedMap:
     """A fitted map of the cube, kept so that later bakes of the same keys skip meshing and fitting.
 
     Parameters
@@ -39,30 +55,49 @@ class PreparedMap:
         identity first, the map fitted to the second key last.
     turns : (M, 3)
         Rotation vectors of the tetrahedra of the last map, radians, in the branch that the motion takes.
-    extra_turns : int
-        The setting that the way was found with.
+    options : FitOptions
+        What it was fitted with.
     engine : str
-        The engine that made the mesh.
-    quality : str
-        How fine the mesh is.
+        The engine that made the mesh, which option ``auto`` leaves open.
+    embedding : Embedding
+        The pair in cube units.
+    landmarks : (n, N)
+        Barycentric coordinates of the first key's vertices in the mesh.
     notes : tuple of str
         Sentences for the user, such as why another engine ran.
     seconds : dict
         Time spent per stage.
-    paths : dict
-        What ``surface_path`` has set up already.
+    path : SurfacePath, optional
+        The surface's path between the keys, where it is known already.
     """
 
     pair: KeyPair
     mesh: TetMesh
     maps: Floats
     turns: Floats
-    extra_turns: int
+    options: FitOptions
     engine: str
-    quality: str
+    embedding: Embedding
+    landmarks: csr_array
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
-    paths: dict[StretchLaw, SurfacePath] = field(default_factory=dict, repr=False)
+    path: SurfacePath | None = field(default=None, repr=False)
+
+    @classmethod
+    def restored(
+        cls,
+        pair: KeyPair,
+        mesh: TetMesh,
+        maps: Floats,
+        turns: Floats,
+        options: FitOptions,
+        engine: str,
+        notes: tuple[str, ...] = (),
+    ) -> FittedMap:
+        """A fitted map from what is stored of it; the rest is computed again."""
+        embedding = Embedding.of(pair)
+        landmarks = interpolation_matrix(mesh, embedding.key0)
+        return cls(pair, mesh, maps, turns, options, engine, embedding, landmarks, notes)
 
     @property
     def mapped(self) -> Floats:
@@ -70,20 +105,9 @@ class PreparedMap:
         return np.asarray(self.maps[-1])
 
     @cached_property
-    def embedding(self) -> Embedding:
-        """The pair in cube units."""
-        return Embedding.of(self.pair)
-
-    def surface_path(self, law: StretchLaw) -> SurfacePath:
-        """The surface's own path between the keys; kept, because setting it up costs as much as several frames."""
-        if law not in self.paths:
-            self.paths[law] = SurfacePath(self.embedding, law, self.extra_turns != 0)
-        return self.paths[law]
-
-    @cached_property
-    def landmarks(self) -> csr_array:
-        """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
-        return interpolation_matrix(self.mesh, self.embedding.key0)
+    def surface_path(self) -> SurfacePath:
+        """The surface's path between the keys; kept, because setting it up costs as much as several frames."""
+        return self.path or SurfacePath(self.embedding, self.options.stretch, self.options.extra_turns != 0)
 
     @cached_property
     def insideness(self) -> Floats:
@@ -110,9 +134,9 @@ class PreparedMap:
             found = self.fitter.fit(nearest, self.landmarks @ values, _REPAIR_ITERATIONS)
         return found
 
-    def landmark_residual(self) -> dict[str, float]:
-        """Distance of the mapped landmarks from the second key: ``rms`` and ``max``, over the bounding-box diagonal."""
+    def landmark_residual(self) -> Residual:
+        """Distance of the mapped landmarks from the second key."""
         embedding = self.embedding
         missed = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
         missed /= self.pair.diagonal * embedding.scale
-        return {"rms": float(np.sqrt(embedding.weights @ missed**2)), "max": float(missed.max())}
+        return Residual(float(np.sqrt(embedding.weights @ missed**2)), float(missed.max()))

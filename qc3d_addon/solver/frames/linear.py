@@ -9,9 +9,9 @@ from collections.abc import Generator
 import numpy as np
 
 from ..arrays import Floats
-from ..collision.colliders import Guard
+from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
-from ..fit.fitted_map import PreparedMap
+from ..fit.fitted_map import FittedMap
 from ..maps.reconstruction import Reconstructor
 from ..maps.representation import polar_decomposition
 from ..tets.mesh import TetMesh
@@ -19,7 +19,7 @@ from .frame import Frame
 
 
 class LinearMaps:
-    """Maps between the identity and a given map, P_t = (1 - t) I + t P (Chen & Lui, section 4.2).
+    """Maps between the identity and a given map, P_t = (1 - t) I + t P (Chen & Lui, section 6.1).
 
     Parameters
     ----------
@@ -50,24 +50,26 @@ class LinearFrames:
 
     notes: tuple[str, ...] = ()
 
-    def __init__(self, prepared: PreparedMap) -> None:
-        self._prepared = prepared
-        self._maps = LinearMaps(prepared.mesh, prepared.mapped)
+    def __init__(self, fitted: FittedMap) -> None:
+        self._fitted = fitted
+        self._maps = LinearMaps(fitted.mesh, fitted.mapped)
         self._limit = CrossingLimit(
-            prepared.pair.faces, prepared.embedding.key0, prepared.embedding.key1, prepared.embedding.still
+            fitted.pair.faces, fitted.embedding.key0, fitted.embedding.key1, fitted.embedding.still
         )
-        self._missed = prepared.embedding.key1 - prepared.landmarks @ prepared.mapped
+        self._missed = fitted.embedding.key1 - fitted.landmarks @ fitted.mapped
 
-    def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1; yields the part that is done. Nothing is kept off colliders."""
+    def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
         made = []
-        pair, still = self._prepared.pair, self._prepared.embedding.still
+        pair, still = self._fitted.pair, self._fitted.embedding.still
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
             values = self._maps.at(time)
-            shape = self._prepared.landmarks @ values + time * self._missed
-            positions = self._prepared.embedding.from_cube(shape, time)
+            shape = self._fitted.landmarks @ values + time * self._missed
+            positions = self._fitted.embedding.from_cube(shape, time)
             # A part that both keys leave in place must not breathe with the map around it.
             positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
-            made.append(Frame.of(self._prepared, positions, values, time, False, self._limit.excess(shape)))
+            if resolver is not None:
+                positions = resolver.cleared(index, positions, time, still)
+            made.append(Frame.of(self._fitted, positions, values, time, False, self._limit.excess(shape)))
         return made

@@ -5,18 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Floats, Ints
-from ..fit.fitted_map import PreparedMap
+from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
 from ..maps.distortion import TriangleStretches, approximate_singular_values, dilatation, extreme_stretch, volume_ratio
 from ..support.threads import in_threads
 from ..triangles.topology import sides, unique_edges
+from .report import WorstStretch
 
 # Ratios beyond this say no more than that something is flat.
 _MOST = 1e6
@@ -25,13 +26,13 @@ _SHORTEST = 1e-6
 
 
 def measure(
-    prepared: Sequence[PreparedMap], segments: Ints, frames: Floats, values: Sequence[Floats]
-) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
-    """Distortion of all frames, and the worst of it.
+    fitted: Sequence[FittedMap], segments: Ints, frames: Floats, values: Sequence[Floats]
+) -> dict[str, NDArray[np.float32]]:
+    """Distortion of all frames.
 
     Parameters
     ----------
-    prepared : sequence of PreparedMap
+    fitted : sequence of FittedMap
         Consecutive pairs of one mesh.
     segments : (k,)
         Number of the pair that each frame belongs to.
@@ -42,27 +43,26 @@ def measure(
 
     Returns
     -------
-    Measures (k, n) by name, see ``VertexMeasures``, and the worst stretch beyond the keys as plain values: ``excess``,
-    the ``frame`` and the ``vertex`` where it is.
+    Measures (k, n) by name, see ``VertexMeasures``.
     """
-    vertex_measures = VertexMeasures(prepared)
+    vertex_measures = VertexMeasures(fitted)
     measures: dict[str, NDArray[np.float32]] = {}
     moments = zip(segments.tolist(), frames, values, strict=True)
     for index, found in enumerate(in_threads(lambda moment: vertex_measures.of(*moment), moments)):
         for name, at_vertices in found.items():
             measures.setdefault(name, np.empty(frames.shape[:2], dtype=np.float32))[index] = at_vertices
-    return measures, worst_stretch([part.pair for part in prepared], segments, frames)
+    return measures
 
 
-def worst_stretch(pairs: Sequence[KeyPair], segments: Ints, frames: Floats) -> dict[str, Any]:
-    """The worst stretch beyond the keys among the frames (k, n, 3) of the pairs ``segments`` (k,), as plain values."""
-    worst = Excess(0.0, 0, 0)
+def worst_stretch(pairs: Sequence[KeyPair], segments: Ints, frames: Floats) -> WorstStretch:
+    """The worst stretch beyond the keys among the frames (k, n, 3) of the pairs ``segments`` (k,)."""
+    worst = WorstStretch(0.0, 0, 0)
     for number, pair in enumerate(pairs):
         members = np.flatnonzero(segments == number)
         found = worst_excess(pair, frames[members])
-        if found.ratio > worst.ratio:
-            worst = found._replace(frame=int(members[found.frame]))
-    return {"excess": worst.ratio, "frame": worst.frame, "vertex": worst.vertex}
+        if found.excess > worst.excess:
+            worst = replace(found, frame=int(members[found.frame]))
+    return worst
 
 
 class VertexMeasures:
@@ -80,24 +80,24 @@ class VertexMeasures:
 
     Parameters
     ----------
-    prepared : sequence of PreparedMap
+    fitted : sequence of FittedMap
         Consecutive pairs of one mesh.
     """
 
-    def __init__(self, prepared: Sequence[PreparedMap]) -> None:
-        self._prepared = prepared
-        self._count = len(prepared[0].pair.key0)
-        faces = prepared[0].pair.faces
-        self._triangles = TriangleStretches(prepared[0].pair.key0, faces)
+    def __init__(self, fitted: Sequence[FittedMap]) -> None:
+        self._fitted = fitted
+        self._count = len(fitted[0].pair.key0)
+        faces = fitted[0].pair.faces
+        self._triangles = TriangleStretches(fitted[0].pair.key0, faces)
         # Triangles in the order of their corners, and where each vertex that has any begins.
         corners = faces.ravel()
         order = np.argsort(corners, kind="stable")
         self._triangles_around = order // 3
         self._starts = np.flatnonzero(np.diff(corners[order], prepend=-1))
         self._with_triangles = corners[order][self._starts]
-        self._averages = [_LandmarkAverages(part) for part in prepared]
+        self._averages = [_LandmarkAverages(part) for part in fitted]
         self._before = [np.broadcast_to(np.eye(3), (self._count, 3, 3))]
-        for number, part in enumerate(prepared[:-1]):
+        for number, part in enumerate(fitted[:-1]):
             whole = part.embedding.motion.rotation @ self._jacobians(number, part.mapped)
             self._before.append(whole @ self._before[-1])
 
@@ -120,7 +120,7 @@ class VertexMeasures:
 
     def _jacobians(self, number: int, values: Floats) -> Floats:
         """(n, 3, 3) Jacobians around the vertices of a map of the cube (N, 3)."""
-        return self._averages[number].of(self._prepared[number].mesh.jacobians(values))
+        return self._averages[number].of(self._fitted[number].mesh.jacobians(values))
 
     def _at_vertices(self, ratios: Floats) -> Floats:
         """(n,) the ratio of the triangles (m,) around each vertex that is farthest from 1; 1 where there are none."""
@@ -136,40 +136,29 @@ class VertexMeasures:
 class _LandmarkAverages:
     """Averages of the tetrahedra around the first key's vertices: first at the mesh's vertices, then at landmarks."""
 
-    def __init__(self, prepared: PreparedMap) -> None:
-        mesh = prepared.mesh
-        self._around = csr_array(mesh.incidence @ diags_array(mesh.volumes * prepared.insideness))
-        totals = prepared.landmarks @ self._around.sum(axis=1)
-        self._landmarks = csr_array(diags_array(1.0 / totals) @ prepared.landmarks)
+    def __init__(self, fitted: FittedMap) -> None:
+        mesh = fitted.mesh
+        self._around = csr_array(mesh.incidence @ diags_array(mesh.volumes * fitted.insideness))
+        totals = fitted.landmarks @ self._around.sum(axis=1)
+        self._landmarks = csr_array(diags_array(1.0 / totals) @ fitted.landmarks)
 
     def of(self, matrices: Floats) -> Floats:
         """(n, 3, 3) averages of matrices (M, 3, 3) of the tetrahedra."""
         return np.asarray((self._landmarks @ (self._around @ matrices.reshape(-1, 9))).reshape(-1, 3, 3))
 
 
-class Excess(NamedTuple):
-    """Where frames stretch or shrink most beyond their keys."""
-
-    ratio: float
-    frame: int
-    vertex: int
-
-
-def worst_excess(pair: KeyPair, frames: Floats) -> Excess:
-    """The edge that leaves the interval between its lengths in the two keys farthest, among frames (k, n, 3).
-
-    ``ratio`` is how far, over the nearer end of that interval: 0 where no edge leaves it.
-    """
+def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:
+    """The edge that leaves the interval between its lengths in the two keys farthest, among frames (k, n, 3)."""
     edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
     lengths = [np.linalg.norm(key[edges[:, 0]] - key[edges[:, 1]], axis=1) for key in (pair.key0, pair.key1)]
     shortest, longest = np.minimum(*lengths), np.maximum(*lengths)
     usable = shortest > _SHORTEST * pair.diagonal
     edges, shortest, longest = edges[usable], shortest[usable], longest[usable]
-    worst = Excess(0.0, 0, 0)
+    worst = WorstStretch(0.0, 0, 0)
     for number, frame in enumerate(frames):
         length = np.linalg.norm(frame[edges[:, 0]] - frame[edges[:, 1]], axis=1)
         excess = np.maximum(length / longest - 1.0, 1.0 - length / shortest)
         edge = int(np.argmax(excess)) if len(excess) else 0
-        if len(excess) and excess[edge] > worst.ratio:
-            worst = Excess(float(excess[edge]), number, int(edges[edge, 0]))
+        if len(excess) and excess[edge] > worst.excess:
+            worst = WorstStretch(float(excess[edge]), number, int(edges[edge, 0]))
     return worst

@@ -13,11 +13,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
-from ..collision.colliders import Guard
+from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
-from ..fit.fitted_map import PreparedMap
+from ..fit.fitted_map import FittedMap
 from ..numerics.rotation_unwrapping import Turning, swing_beside
-from ..settings import StretchLaw
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
@@ -33,30 +32,28 @@ _STRONGEST_ANCHOR = 1e5
 
 
 class NaturalFrames:
-    """In-betweens of a prepared pair; both keys are met, what both leave in place stays, no map has folds.
+    """In-betweens of a fitted pair; both keys are met, what both leave in place stays, no map has folds.
 
     Parameters
     ----------
-    prepared : PreparedMap
-    law : StretchLaw
-        How stretches are interpolated.
+    fitted : FittedMap
     """
 
-    def __init__(self, prepared: PreparedMap, law: StretchLaw = "linear") -> None:
-        self._prepared = prepared
+    def __init__(self, fitted: FittedMap) -> None:
+        self._fitted = fitted
         self.notes: tuple[str, ...] = ()
-        embedding, mesh = prepared.embedding, prepared.mesh
-        self._surface = prepared.surface_path(law)
-        self._spins = ExtraSpins(embedding, self._surface, prepared.extra_turns)
-        if prepared.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
+        embedding, mesh = fitted.embedding, fitted.mesh
+        self._surface = fitted.surface_path
+        self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
+        if fitted.options.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
-        with beside(lambda: CrossingLimit(prepared.pair.faces, embedding.key0, embedding.key1, self.still)) as limit:
-            turning = _turning_inside(prepared, self._surface)
-            self._volume = VolumePath(mesh, prepared.maps, turning, prepared.insideness, law)
+        with beside(lambda: CrossingLimit(fitted.pair.faces, embedding.key0, embedding.key1, self.still)) as limit:
+            turning = _turning_inside(fitted, self._surface)
+            self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
         self._missed = [
-            key - prepared.landmarks @ self._volume.at(time)
+            key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
         ]
 
@@ -73,7 +70,7 @@ class NaturalFrames:
     @property
     def resting(self) -> Bools:
         """(m,) whether a corner of these triangles stays in place."""
-        return np.asarray(self.still[self._prepared.pair.faces[self.rows]].any(axis=1))
+        return np.asarray(self.still[self._fitted.pair.faces[self.rows]].any(axis=1))
 
     @property
     def components(self) -> Ints:
@@ -82,11 +79,11 @@ class NaturalFrames:
 
     def key(self, end: int) -> Floats:
         """(n, 3) the first key (0) or the second (1)."""
-        return self._prepared.pair.key1 if end else self._prepared.pair.key0
+        return self._fitted.pair.key1 if end else self._fitted.pair.key0
 
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates at both keys, in the keys' own coordinates."""
-        motion, volume = self._prepared.embedding.motion, self._prepared.embedding.scale**-3
+        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**-3
         first, second = self._surface.end_rates()
         spins = (first.spin + motion.turn, second.spin @ motion.rotation.T + motion.turn)
         return Rates(spins[0], first.strain, volume * first.growth), Rates(
@@ -95,7 +92,7 @@ class NaturalFrames:
 
     def with_end_rates(self, first: Rates, second: Rates) -> NaturalFrames:
         """The same in-betweens with other rates at the two keys, in the keys' own coordinates."""
-        motion, volume = self._prepared.embedding.motion, self._prepared.embedding.scale**3
+        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**3
         spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
         changed = copy.copy(self)
         changed._surface = self._surface.with_end_rates(
@@ -113,8 +110,8 @@ class NaturalFrames:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
         return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
 
-    def frames(self, times: Floats, guard: Guard | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1, kept off by ``guard``; yields the part that is done."""
+    def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
         volumes: list[Floats] = []
         positions: list[Floats] = []
         excess: list[int] = []
@@ -126,8 +123,8 @@ class NaturalFrames:
             excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
-        if guard is not None:
-            positions = yield from self._kept_off(guard, times, volumes, positions)
+        if resolver is not None:
+            positions = yield from self._cleared(resolver, times, volumes, positions)
             crossings = list(in_threads(self._limit.excess, positions))
         made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
         return list(made)
@@ -137,12 +134,12 @@ class NaturalFrames:
         time, values, positions, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
         found = self._volume.followed(time, values)
-        repaired = self._prepared.folds(found) > 0
-        if repaired and not self._prepared.folds(values):
+        repaired = self._fitted.folds(found) > 0
+        if repaired and not self._fitted.folds(values):
             found, repaired = values, False
         if repaired:
-            found = self._prepared.unfolded(found, time)
-        return Frame.of(self._prepared, self._placed(positions, time), found, time, repaired, crossings)
+            found = self._fitted.unfolded(found, time)
+        return Frame.of(self._fitted, self._placed(positions, time), found, time, repaired, crossings)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int]]:
         """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
@@ -152,8 +149,8 @@ class NaturalFrames:
 
     def _placed(self, shape: Floats, time: float) -> Floats:
         """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
-        pair, still = self._prepared.pair, self.still
-        positions = self._prepared.embedding.from_cube(shape, time)
+        pair, still = self._fitted.pair, self.still
+        positions = self._fitted.embedding.from_cube(shape, time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -172,7 +169,7 @@ class NaturalFrames:
 
     def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
         """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
-        landmarks, missed = self._prepared.landmarks, self._missed
+        landmarks, missed = self._fitted.landmarks, self._missed
         return [
             (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
             for values, time in zip(maps, times, strict=True)
@@ -200,11 +197,11 @@ class NaturalFrames:
             positions, excess = tried, remaining
         return positions, excess
 
-    def _kept_off(
-        self, guard: Guard, times: Floats, volumes: list[Floats], positions: list[Floats]
+    def _cleared(
+        self, resolver: CollisionResolver, times: Floats, volumes: list[Floats], positions: list[Floats]
     ) -> Generator[float, None, list[Floats]]:
-        """Push vertices off the colliders and let the surface around give way, until none is too near."""
-        embedding = self._prepared.embedding
+        """Push vertices out of the colliders and let the surface around give way, until none is too near."""
+        embedding = self._fitted.embedding
         moments = times.tolist()
         reach = np.zeros(len(self.still))
         for attempt in range(_PUSHES + 1):
@@ -212,7 +209,7 @@ class NaturalFrames:
             nearby, pushed = [], []
             for index, time in enumerate(moments):
                 place = self._placed(positions[index], time)
-                near, moved = guard.pushed(index, place, time)
+                near, moved = resolver.pushed(index, place, time)
                 nearby.append(near & ~self.still)
                 push = np.where(nearby[-1][:, None], embedding.vectors_to_cube(moved - place, time), 0.0)
                 pushed.append(positions[index] + push)
@@ -235,13 +232,13 @@ class NaturalFrames:
         return positions
 
 
-def _turning_inside(prepared: PreparedMap, surface: SurfacePath) -> Turning:
+def _turning_inside(fitted: FittedMap, surface: SurfacePath) -> Turning:
     """How tetrahedra turn: as the fit followed them, or, where the surface twists, with its nearest twist."""
     triangles, twist = surface.deformation.faces, surface.turning.twist
     if not twist.any():
-        return Turning(prepared.turns, np.zeros_like(prepared.turns))
-    centres = prepared.embedding.key0[surface.vertices[triangles]].mean(axis=1)
-    nearest = cKDTree(centres).query(prepared.mesh.centroids)[1]
+        return Turning(fitted.turns, np.zeros_like(fitted.turns))
+    centres = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
+    nearest = cKDTree(centres).query(fitted.mesh.centroids)[1]
     twists = twist[nearest].any(axis=1)
-    swing = np.where(twists[:, None], swing_beside(prepared.turns, twist[nearest]), prepared.turns)
+    swing = np.where(twists[:, None], swing_beside(fitted.turns, twist[nearest]), fitted.turns)
     return Turning(swing, twist[nearest])

@@ -9,10 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
+from ..numerics.rotation_unwrapping import mean_turn
 from ..numerics.rotations import rotation_matrices
 from ..numerics.screws import best_turns, translation_factors
-from ..triangles.geometry import vertex_areas
+from ..triangles.deformation import TriangleDeformation
+from ..triangles.geometry import areas, vertex_areas
+from ..triangles.topology import face_adjacency, welded
 from .keypair import KeyPair
 
 STILL_TOLERANCE = 1e-6
@@ -48,7 +51,28 @@ class RigidMotion:
         weights = weights / weights.sum()
         source_centre, target_centre = weights @ source, weights @ target
         covariance = (target - target_centre).T @ (weights[:, None] * (source - source_centre))
-        turn = best_turns(covariance[None])[0]
+        return cls._of_turn(best_turns(covariance[None])[0], source_centre, target_centre)
+
+    @classmethod
+    def of_surface(cls, source: Floats, target: Floats, faces: Ints) -> RigidMotion:
+        """The mean motion of a surface from the shape ``source`` (n, 3) to ``target``.
+
+        It turns by the mean of the triangles' unwrapped rotations, weighted by area, and carries the centre of the
+        surface along. The best fit of the positions, which is all there is without triangles, is another thing where
+        wings flap or ends twist: there it can be half a turn away from every one of them.
+        """
+        weights = vertex_areas(source, faces)
+        vertices, group = welded(source, target)
+        deformation = TriangleDeformation.between(source[vertices], target[vertices], group[faces])
+        if not len(deformation.faces):
+            return cls.between(source, target, weights)
+        # The same for both directions, and however much a key is scaled.
+        sizes = np.sqrt(np.prod([areas(key[vertices], deformation.faces) for key in (source, target)], axis=0))
+        turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes)
+        return cls._of_turn(turn, *(np.average(key, axis=0, weights=weights) for key in (source, target)))
+
+    @classmethod
+    def _of_turn(cls, turn: Floats, source_centre: Floats, target_centre: Floats) -> RigidMotion:
         shift = target_centre - rotation_matrices(turn[None])[0] @ source_centre
         return cls(turn, np.linalg.solve(translation_factors(turn[None])[0], shift))
 
@@ -78,7 +102,7 @@ class Embedding:
     still : (n,) bool
         Vertices that both keys leave in place; where there is one, ``motion`` is the identity.
     motion : RigidMotion
-        Carries the first key onto the second as well as a rigid motion can, in the keys' own units.
+        Carries the first key along with the second as their surface does on average, in the keys' own units.
     centre : (3,)
         Point that goes to the middle of the cube.
     scale : float
@@ -96,9 +120,7 @@ class Embedding:
         """Embed a pair: both keys, the second one without its rigid motion, fill [0.17, 0.83]^3."""
         still = np.linalg.norm(pair.key1 - pair.key0, axis=1) <= STILL_TOLERANCE * pair.diagonal
         motion = (
-            RigidMotion.identity()
-            if still.any()
-            else RigidMotion.between(pair.key0, pair.key1, vertex_areas(pair.key0, pair.faces))
+            RigidMotion.identity() if still.any() else RigidMotion.of_surface(pair.key0, pair.key1, pair.faces)
         )
         both = np.concatenate([pair.key0, motion.undo(pair.key1)])
         low, high = both.min(axis=0), both.max(axis=0)

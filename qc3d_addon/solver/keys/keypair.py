@@ -4,14 +4,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
-from ..errors import InputError
+from ..errors import InputError, naming_pair
+from ..triangles.topology import welded
+
+# The names of the first and the second key of a pair.
+Ends = tuple[str, str]
 
 # Cubes of what lies between, and squares of its areas, still are numbers.
 _SMALLEST, LARGEST = 1e-75, 1e75
@@ -65,6 +71,42 @@ class KeyPair:
     def diagonal(self) -> float:
         """Length of the first key's bounding-box diagonal, the unit of relative errors."""
         return float(np.linalg.norm(np.ptp(self.key0, axis=0)))
+
+    @cached_property
+    def welding(self) -> tuple[Ints, Ints]:
+        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,)."""
+        return welded(self.key0, self.key1)
+
+
+def consecutive_pairs(
+    shapes: Mapping[str, ArrayLike], faces: ArrayLike, edges: ArrayLike | None, through: Sequence[str]
+) -> dict[Ends, KeyPair]:
+    """The pair of every two keys that follow each other, by their names; one that comes again is made once.
+
+    Parameters
+    ----------
+    shapes : dict of (n, 3)
+        Shapes of one mesh by name.
+    faces, edges : (m, 3), (e, 2)
+        See ``KeyPair``.
+    through : sequence of str
+        Names of the keys from the first to the last.
+
+    Raises
+    ------
+    InputError
+        If two keys that follow each other are one and the same, or cannot be used.
+    """
+    pairs: dict[Ends, KeyPair] = {}
+    for first, second in pairwise(through):
+        if first == second and len(through) == 2:
+            raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
+        if first == second:
+            raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
+        if (first, second) not in pairs:
+            with naming_pair(first, second, through):
+                pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges)
+    return pairs
 
 
 def _positions(key: ArrayLike, name: str) -> Floats:

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.geometry import areas
-from ..triangles.topology import sides, unique_edges, vertex_components, welded
+from ..triangles.topology import sides, unique_edges, vertex_components
 from .keypair import KeyPair
 
 # Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
@@ -45,7 +45,7 @@ def mirrored_share(pair: KeyPair) -> float:
     scaling and what a reflection with scaling leave of them (Kabsch 1976): flat ones, whose mirror image a turn
     reaches, are never mirrored.
     """
-    vertices, group = welded(pair.key0, pair.key1)
+    vertices, group = pair.welding
     keys = [_in_unit_size(key[vertices]) for key in (pair.key0, pair.key1)]
     faces = group[pair.faces]
     labels = vertex_components(unique_edges(sides(faces)), len(vertices))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import MeshingError
-from ..settings import Settings
+from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from .delaunay import delaunay_mesh
 from .poisson_disk import RESOLUTIONS
@@ -39,15 +39,10 @@ class FilledCube:
     notes: tuple[str, ...]
 
 
-def engine_available(name: str) -> bool:
-    """Whether the engine can run here; cheap, loads nothing compiled."""
-    return name in ("auto", "delaunay") or (name == "tetwild" and unavailable_reason() is None)
-
-
-def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
+def fill_cube(points: Floats, faces: Ints, options: FitOptions) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
-    The surface's vertices do not become vertices of the mesh: the resolution follows ``settings.quality``, not the
+    The surface's vertices do not become vertices of the mesh: the resolution follows ``options.quality``, not the
     vertex count. Find the vertices in the mesh with :mod:`.location`.
 
     Parameters
@@ -56,7 +51,7 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
         Vertices inside [0.14, 0.86]³.
     faces : (m, 3) int64
         Triangles: open, non-manifold, crossing, degenerate or none at all.
-    settings : Settings
+    options : FitOptions
 
     Raises
     ------
@@ -66,20 +61,20 @@ def fill_cube(points: Floats, faces: Ints, settings: Settings) -> FilledCube:
     """
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
-    resolution = RESOLUTIONS[settings.quality]
+    resolution = RESOLUTIONS[options.quality]
     notes: list[str] = []
-    if settings.engine != "delaunay":
+    if options.engine != "delaunay":
         try:
-            mesh = tetwild_mesh(points, faces, resolution, settings.seed, settings.mesh_time_limit)
+            mesh = tetwild_mesh(points, faces, resolution, options.seed, options.mesh_time_limit)
             require_filled_cube(mesh)
             return FilledCube(mesh, "tetwild", ())
         except MeshingError as error:
-            if settings.engine == "tetwild" and unavailable_reason() is not None:
+            if options.engine == "tetwild" and unavailable_reason() is not None:
                 raise MeshingError(f"{error} Choose the engine delaunay or auto.") from error
-            if settings.engine == "tetwild":
+            if options.engine == "tetwild":
                 raise
             notes.append(f"The cube was filled by the engine delaunay. {error}")
-    mesh = delaunay_mesh(points, faces, resolution, settings.seed)
+    mesh = delaunay_mesh(points, faces, resolution, options.seed)
     require_filled_cube(mesh)
     return FilledCube(mesh, "delaunay", tuple(notes))
 

@@ -8,6 +8,7 @@ carried from element to element along a spanning tree that crosses the smallest 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,6 +24,8 @@ from .rotations import nearest_branch, products, rotation_matrices, rotation_vec
 
 _MOST_SWING = 1.55 * np.pi
 _FAIR_SHARE = 0.02
+_MEAN_STEPS = 30
+_MEAN_FOUND = 1e-13  # radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,39 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
 
 
+def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
+    """Rotation vector (3,), the short way round, of the mean of rotations that are unwrapped about it.
+
+    The Karcher mean: the rotation beside which the turns of the elements add up to nothing. Beside it every part is
+    unwrapped from its element that turns least, so that ends twisted by more than half a turn either way cancel out,
+    where the best fit of positions would be a tie between all directions.
+
+    Parameters
+    ----------
+    turns : (m, 3)
+        Rotation vectors, angles in [0, pi]; at least one.
+    adjacency : (k, 2) int64
+        Pairs of neighbouring elements.
+    weights : (m,)
+        What elements count; positive somewhere.
+
+    References
+    ----------
+    Karcher, "Riemannian center of mass and mollifier smoothing", 1977.
+    """
+    forest = _Forest(turns, adjacency)
+    rotations = rotation_matrices(turns)
+    shares = weights / weights.sum()
+    mean = np.eye(3)
+    for _ in range(_MEAN_STEPS):
+        beside = rotation_vectors(mean.T @ rotations)
+        step = shares @ forest.rooted(beside).carried(beside, nearest_branch)
+        mean = mean @ rotation_matrices(step[None])[0]
+        if np.linalg.norm(step) < _MEAN_FOUND:
+            break
+    return np.asarray(rotation_vectors(mean[None])[0])
+
+
 def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, loose: Bools) -> Floats:
     """Rotation vectors (m, 3) with every loose part in the branch that is nearest to the largest part's."""
     largest = forest.labels == np.argmax(np.bincount(forest.labels))
@@ -133,15 +169,24 @@ class _Forest:
         # A relative rotation of zero must still count as an edge of the graph.
         cost = _relative_angles(turns[first], turns[second]) + 1e-9
         tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
-        parts, labels = connected_components(tree, directed=False)
-        self.labels: Ints = np.asarray(labels, dtype=np.int64)
+        self.labels: Ints = np.asarray(connected_components(tree, directed=False)[1], dtype=np.int64)
+        self._edges: list[Ints] = [end.astype(np.int64) for end in tree.nonzero()]
+        self._root(turns)
+
+    def rooted(self, turns: Floats) -> _Forest:
+        """The same trees where elements turn by ``turns`` (m, 3) instead, all beside one and the same rotation."""
+        other = copy.copy(self)
+        other._root(turns)
+        return other
+
+    def _root(self, turns: Floats) -> None:
+        count, labels = len(turns), self.labels
         by_angle = np.lexsort((np.linalg.norm(turns, axis=1), labels))
-        roots = by_angle[np.searchsorted(labels[by_angle], np.arange(parts))]
-        self.roots: Ints = roots
+        self.roots: Ints = by_angle[np.searchsorted(labels[by_angle], np.arange(labels.max() + 1))]
         # One more node joins all roots, so that one search covers every part.
-        rows, columns = tree.nonzero()
-        rows = np.concatenate([rows, np.full(len(roots), count)])
-        columns = np.concatenate([columns, roots])
+        rows, columns = self._edges
+        rows = np.concatenate([rows, np.full(len(self.roots), count)])
+        columns = np.concatenate([columns, self.roots])
         joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
         order, self._parents = (found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False))
         depth = _depths(order, self._parents)

@@ -17,9 +17,9 @@ from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
 from ..triangles.closed_volume import ClosedComponents
-from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components, welded
+from ..triangles.deformation import TriangleDeformation
+from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components
 from .anchors import ScrewAnchors
-from .deformation import TriangleDeformation, tangents_of
 from .end_rates import (
     EndCorrection,
     Rates,
@@ -32,6 +32,7 @@ from .end_rates import (
 )
 from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
+from .tangents import tangents_of
 
 ANCHOR_WEIGHT = 0.05
 SWEEPS = 13
@@ -71,7 +72,7 @@ class SurfacePath:
 
     def __init__(self, embedding: Embedding, law: StretchLaw = "linear", free_after_turns: bool = False) -> None:
         self._law: StretchLaw = law
-        self.vertices, self._group = welded(embedding.key0, embedding.key1)
+        self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._travel = key1 - self._key0
         still = embedding.still[self.vertices]

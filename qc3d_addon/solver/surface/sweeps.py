@@ -18,8 +18,8 @@ from scipy.sparse import csc_array, csr_array
 
 from ..arrays import Floats
 from ..numerics.chebyshev import ChebyshevIteration
-from .deformation import closest_tangents, stretched
 from .system import MovingSurface
+from .tangents import closest_tangents, stretched
 
 # Fixed weights: shapes have not settled fully, and what adaptive weights make of them jumps from one time to the next.
 _RADIUS = 0.95

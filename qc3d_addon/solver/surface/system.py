@@ -17,8 +17,8 @@ from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_e
 from ..numerics.nested_dissection import dissection_order, factored
 from ..numerics.rotations import by_component
 from ..triangles.closed_volume import ClosedComponents
+from ..triangles.deformation import TriangleDeformation
 from ..triangles.topology import distinct
-from .deformation import TriangleDeformation
 from .volumes import MovingVolumes
 
 

@@ -8,17 +8,20 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.arrays import Floats, Ints
-from qc3d_addon.solver.collision.colliders import Collider, Guard, Obstacle
+from qc3d_addon.solver.collision.colliders import Collider, CollisionResolver, PosedCollider
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.frames.chain import Bake, chain_inbetweens, evenly_spaced, finish, prepare
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.frames.bake import Bake, evenly_spaced
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions, Mode
+from qc3d_addon.solver.support.progress import finish
 
+from ..baking import frames_of
 from ..meshes import icosphere
 
 TIMES = evenly_spaced(7)
-SETTINGS = Settings(engine="delaunay", quality="normal")
+SETTINGS = FitOptions()
 
 
 def bulging(points: Floats) -> Floats:
@@ -54,9 +57,8 @@ TURN = rotation_matrices(np.array([[0.3, 1.0, -0.5]]))[0]
 
 
 def bake(key0: Floats, key1: Floats, collider: Collider | None, mode: str = "natural") -> Bake:
-    settings = Settings(engine="delaunay", quality="normal", mode=mode)  # type: ignore[arg-type]
-    prepared = finish(prepare(KeyPair.checked(key0, key1, FACES), SETTINGS))
-    return finish(chain_inbetweens([prepared], TIMES, settings, collider))
+    fitted = finish(fit_pair(KeyPair.checked(key0, key1, FACES), SETTINGS))
+    return frames_of(fitted, TIMES, mode, collider=collider)
 
 
 @pytest.mark.parametrize(("scale", "shift", "turn"), [(1.0, 0.0, np.eye(3)), (37.0, 100.0, TURN)])
@@ -64,24 +66,24 @@ def test_a_lid_goes_over_the_eyeball(scale: float, shift: float, turn: Floats) -
     eye, eye_faces = eyeball()
     place = lambda points: scale * points @ turn.T + shift  # noqa: E731
     collider = Collider.checked(np.stack([place(eye)] * 2), eye_faces)
-    fixed = Obstacle(collider, np.broadcast_to(place(eye), (len(TIMES), *eye.shape)))
+    fixed = PosedCollider(collider, np.broadcast_to(place(eye), (len(TIMES), *eye.shape)))
     key0, key1 = place(OPEN), place(CLOSED)
-    straight = [fixed.crossings(0, (1.0 - time) * key0 + time * key1, FACES) for time in TIMES]
+    straight = fixed.crossings(np.array([(1.0 - time) * key0 + time * key1 for time in TIMES]), FACES)
     without = bake(key0, key1, None)
     found = bake(key0, key1, collider)
     assert straight[0] == straight[-1] == 0
     assert max(straight) > 50
-    assert max(fixed.crossings(0, frame, FACES) for frame in without.frames) > 20
-    assert found.report["collider_crossings"] == [0] * len(TIMES)
-    assert [fixed.crossings(0, frame, FACES) for frame in found.frames] == [0] * len(TIMES)
-    assert found.report["crossings"] == [0] * len(TIMES)
+    assert max(fixed.crossings(without.frames, FACES)) > 20
+    assert found.report.collider_crossings == [0] * len(TIMES)
+    assert fixed.crossings(found.frames, FACES) == [0] * len(TIMES)
+    assert found.report.crossings == [0] * len(TIMES)
     np.testing.assert_array_equal(found.frames[0], key0)
     np.testing.assert_array_equal(found.frames[-1], key1)
     # The corners and the crease that both keys leave in place stay there, and lengths hold about as well as they can.
     still = np.linalg.norm(key1 - key0, axis=1) == 0.0
     assert still.any()
     assert (found.frames[:, still] == key0[still]).all()
-    assert found.report["worst_stretch"]["excess"] < 0.2
+    assert found.report.worst_stretch.excess < 0.2
 
 
 def test_a_collider_far_away_changes_nothing() -> None:
@@ -98,7 +100,7 @@ def test_a_collider_that_moves() -> None:
     assert collider.moves
     key1 = bulging(CLOSED @ aside) @ aside.T + 0.02 * CLOSED / np.linalg.norm(CLOSED, axis=1, keepdims=True)
     found = bake(OPEN, key1, collider)
-    assert found.report["collider_crossings"] == [0] * len(TIMES)
+    assert found.report.collider_crossings == [0] * len(TIMES)
 
 
 def test_what_a_key_has_inside_stays_as_deep_and_is_told() -> None:
@@ -106,34 +108,40 @@ def test_what_a_key_has_inside_stays_as_deep_and_is_told() -> None:
     collider = Collider.checked(np.stack([eye] * 2), eye_faces)
     sunk = CLOSED * 0.97
     found = bake(OPEN, sunk, collider)
-    counts = found.report["collider_crossings"]
+    counts = found.report.collider_crossings
     assert counts[0] == 0 < counts[-1]
-    assert any("crosses the colliders in" in note for note in found.report["notes"])
+    assert any("crosses the colliders in" in note for note in found.report.notes)
     np.testing.assert_array_equal(found.frames[-1], sunk)
 
 
-def test_mode_linear_does_not_look_at_colliders() -> None:
+@pytest.mark.parametrize("mode", ["natural", "linear", "straight"])
+@pytest.mark.parametrize("moves", [False, True])
+def test_every_mode_keeps_clear_of_colliders(mode: Mode, moves: bool) -> None:
     eye, eye_faces = eyeball()
-    collider = Collider.checked(np.stack([eye] * 2), eye_faces)
-    found, without = bake(OPEN, CLOSED, collider, "linear"), bake(OPEN, CLOSED, None, "linear")
-    np.testing.assert_array_equal(found.frames, without.frames)
-    assert max(found.report["collider_crossings"]) > 0
+    collider = Collider.checked(np.stack([eye, 0.99 * eye if moves else eye]), eye_faces)
+    assert collider.moves == moves
+    found, without = bake(OPEN, CLOSED, collider, mode), bake(OPEN, CLOSED, None, mode)
+    assert without.report.collider_crossings is None
+    crossings = PosedCollider(collider, np.broadcast_to(eye, (len(TIMES), *eye.shape))).crossings(without.frames, FACES)
+    assert max(found.report.collider_crossings) < 0.1 * max(crossings)
+    np.testing.assert_array_equal(found.frames[0], OPEN)
+    np.testing.assert_array_equal(found.frames[-1], CLOSED)
 
 
-def test_the_guard_keeps_what_the_keys_keep_but_no_more_than_needed() -> None:
+def test_the_resolver_keeps_what_the_keys_keep_but_no_more_than_needed() -> None:
     eye, eye_faces = icosphere(3)
-    obstacle = Obstacle(Collider.checked(np.stack([eye - 0.5] * 2), eye_faces), np.stack([eye - 0.5] * 3))
+    posed = PosedCollider(Collider.checked(np.stack([eye - 0.5] * 2), eye_faces), np.stack([eye - 0.5] * 3))
     points = np.array([[0.0, 0.0, 0.4], [0.0, 0.4, 0.0], [0.9, 0.0, 0.0], [1.0, 1.0, 1.0]])
     pair = KeyPair.checked(points, points * 1.1, [[0, 1, 2]])
-    guard = Guard(obstacle, pair, 0, np.array([0, 1, 2]))
-    near, moved = guard.pushed(1, points * 0.7, 0.5)
+    resolver = CollisionResolver(posed, pair, 0, np.array([0, 1, 2]))
+    near, moved = resolver.pushed(1, points * 0.7, 0.5)
     np.testing.assert_array_equal(near, [True, True, False, False])
     kept = np.linalg.norm(moved, axis=1) - 0.3
     triangle = points[:3]
     edges = np.linalg.norm(triangle - np.roll(triangle, 1, axis=0), axis=1).mean()
     np.testing.assert_allclose(kept[:2], np.minimum([0.12, 0.12], 0.25 * edges), atol=2e-3)
-    assert not guard.pushed(0, points, 0.0)[0].any()
-    assert not guard.pushed(2, points * 1.1, 1.0)[0].any()
+    assert not resolver.pushed(0, points, 0.0)[0].any()
+    assert not resolver.pushed(2, points * 1.1, 1.0)[0].any()
 
 
 @pytest.mark.parametrize(

@@ -63,3 +63,38 @@ def test_triangles_without_an_area_are_left_out() -> None:
     expected = SurfaceDistance(points, faces).nearest(queries)
     for one, other in zip(expected, SurfaceDistance(points, with_flat).nearest(queries), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_large_coarse_floor_beside_a_fine_ball() -> None:
+    ball, ball_faces = icosphere(4, radius=1.0)
+    ball = ball - 0.5
+    floor, floor_faces = box_surface((1, 1, 1), (100.0, 100.0, 1.0))
+    floor = floor - [50.0, 50.0, 2.2]
+    found = SurfaceDistance(np.concatenate([ball, floor]), np.concatenate([ball_faces, floor_faces + len(ball)]))
+    random = np.random.default_rng(0)
+    directions = random.normal(size=(300, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for radius, side in ((0.98, -1.0), (1.02, 1.0)):
+        distance, _, _ = found.nearest(radius * directions)
+        assert (np.sign(distance) == side).all()
+        np.testing.assert_allclose(distance, radius - 1.0, atol=2e-3)
+
+
+def test_copies_of_vertices_are_one_vertex() -> None:
+    points, faces = box_surface((1, 1, 1), (2.0, 2.0, 2.0))
+    split = points[faces].reshape(-1, 3)
+    queries = np.random.default_rng(1).uniform(-1.0, 3.0, (400, 3))
+    joined = SurfaceDistance(points, faces).nearest(queries)[0]
+    apart = SurfaceDistance(split, np.arange(len(split)).reshape(-1, 3)).nearest(queries)[0]
+    np.testing.assert_allclose(apart, joined, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("sharpness", [0.02, 0.3])
+def test_the_side_is_right_beyond_sharp_edges(sharpness: float) -> None:
+    # A wedge: beyond its edge, the normal of one of the two faces alone says inside.
+    above, below = [[1.0, 0.0, sharpness], [1.0, 1.0, sharpness]], [[1.0, 0.0, -sharpness], [1.0, 1.0, -sharpness]]
+    points = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], *above, *below])
+    faces = np.array([[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4], [2, 4, 5], [2, 5, 3], [0, 4, 2], [1, 3, 5]])
+    random = np.random.default_rng(2)
+    beyond = np.column_stack([-random.uniform(0.01, 1.0, 200), random.uniform(0, 1, 200), random.normal(size=200)])
+    assert (SurfaceDistance(points, faces).nearest(beyond)[0] > 0.0).all()

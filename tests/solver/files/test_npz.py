@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files are looked at before they are opened, arrays before they are allocated."""
+"""Files are looked at before they are opened, arrays before they are allocated; several files are written or none."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from numpy.lib import format as npy
 from qc3d_addon.cli.reconstruct import read_landmarks
 from qc3d_addon.solver.compression.files import Source, read_compressed
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.files.npz import read_pairs
 from qc3d_addon.solver.fit.files import read_maps
+from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.maps.files import read_tets
 
 from ..meshes import icosphere, kuhn_grid

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of prepared maps come back as they were, or not at all."""
+"""Files of fitted maps come back as they were, or not at all."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.fit.files import KeptMaps, read_maps, write_maps
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 
 KEPT = KeptMaps(
     ("rest", "jäw", "rest", "jäw"),  # the way back and again: two maps
-    Settings(stretch="logarithmic", extra_turns=-2, engine="delaunay", quality="finest", seed=7),
+    FitOptions(stretch="logarithmic", extra_turns=-2, engine="delaunay", quality="finest", seed=7),
     {("rest", "jäw"): b"one", ("jäw", "rest"): b""},
 )
 FIXED = 14
@@ -40,7 +40,7 @@ def with_header(path: Path, **changes: Any) -> None:  # noqa: ANN401 - anything 
 
 def test_there_and_back(path: Path) -> None:
     found = read_maps(path)
-    assert (found.through, found.settings, found.maps) == (KEPT.through, KEPT.settings, KEPT.maps)
+    assert (found.through, found.options, found.maps) == (KEPT.through, KEPT.options, KEPT.maps)
 
 
 def test_every_truncation_is_refused(path: Path) -> None:

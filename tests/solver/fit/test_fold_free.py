@@ -12,12 +12,13 @@ import pytest
 
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.fit import fold_free
+from qc3d_addon.solver.fit.fit_pair import fit_pair
 from qc3d_addon.solver.fit.fold_free import LANDMARK_WEIGHT, FoldFreeFitter
-from qc3d_addon.solver.frames.chain import finish, prepare
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.assembly import StiffnessPattern
 from qc3d_addon.solver.numerics.rotations import cofactors, determinants
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_addon.solver.tets.point_location import interpolation_matrix
 
@@ -260,8 +261,8 @@ def test_real_keys_have_no_folds(data_folder: Path, file: str, first: str, secon
         names = arrays["shape_names"].tolist()
         key0, key1 = (arrays[f"V{names.index(name)}"] for name in (first, second))
         pair = KeyPair.checked(key0, key1, arrays["faces"])
-    prepared = finish(prepare(pair, Settings(engine="delaunay", quality="normal")))
-    assert_a_map_of_the_cube(prepared.mesh, prepared.mapped)
-    assert prepared.folds(prepared.mapped) == 0
+    fitted = finish(fit_pair(pair, FitOptions()))
+    assert_a_map_of_the_cube(fitted.mesh, fitted.mapped)
+    assert fitted.folds(fitted.mapped) == 0
     moved = np.linalg.norm(pair.key1 - pair.key0, axis=1).max() / pair.diagonal
-    assert prepared.landmark_residual()["rms"] < 0.05 * moved
+    assert fitted.landmark_residual().rms < 0.05 * moved

@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 from numpy.lib import format as npy
 
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.fit.fitted_map import PreparedMap
+from qc3d_addon.solver.fit.fitted_map import FittedMap
 from qc3d_addon.solver.fit.storage import fingerprint, from_bytes, to_bytes
 from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.settings import FitOptions
 
 from ..meshes import icosphere, jittered_grid, sine_map
 
@@ -28,17 +29,16 @@ POINTS, FACES = icosphere(0)
 PAIR = KeyPair.checked(POINTS, 1.1 * POINTS, FACES, [[0, 5]])
 
 
-def prepared() -> PreparedMap:
+def fitted() -> FittedMap:
     mesh = jittered_grid(2, seed=1)
     half, full = (sine_map(mesh.points, np.full((1, 3), size), np.ones((1, 3, 3))) for size in (0.03, 0.06))
     maps = np.stack([mesh.points, half, full])
     turns = np.random.default_rng(0).normal(size=(len(mesh.tets), 3))
-    return PreparedMap(
-        PAIR, mesh, maps, turns, 2, "delaunay", "finest", ("Ein Satz für dich – „so“.", "Two."), {"mesh": 1.0}
-    )
+    options = FitOptions(quality="finest", extra_turns=2)
+    return FittedMap.restored(PAIR, mesh, maps, turns, options, "delaunay", ("Ein Satz für dich – „so“.", "Two."))
 
 
-STORED = to_bytes(prepared())
+STORED = to_bytes(fitted())
 SEAL = hashlib.sha256().digest_size
 
 
@@ -58,7 +58,7 @@ def sealed(found: dict[str, Any]) -> bytes:
     return hashlib.sha256(buffer.getvalue()).digest() + buffer.getvalue()
 
 
-def assert_identical(found: PreparedMap, expected: PreparedMap) -> None:
+def assert_identical(found: FittedMap, expected: FittedMap) -> None:
     assert found.pair is PAIR
     for one, other in (
         (found.mesh.points, expected.mesh.points),
@@ -68,7 +68,7 @@ def assert_identical(found: PreparedMap, expected: PreparedMap) -> None:
     ):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)
-    assert (found.engine, found.notes, found.extra_turns) == (expected.engine, expected.notes, expected.extra_turns)
+    assert (found.engine, found.notes, found.options) == (expected.engine, expected.notes, expected.options)
 
 
 def assert_refused_or_identical(data: bytes) -> None:
@@ -76,15 +76,15 @@ def assert_refused_or_identical(data: bytes) -> None:
         found = from_bytes(data, PAIR)
     except InputError:
         return
-    assert_identical(found, prepared())
+    assert_identical(found, fitted())
 
 
 class TestRoundTrip:
     def test_bit_for_bit(self) -> None:
-        assert_identical(from_bytes(STORED, PAIR), prepared())
+        assert_identical(from_bytes(STORED, PAIR), fitted())
 
     def test_again_and_again(self) -> None:
-        assert_identical(from_bytes(to_bytes(from_bytes(STORED, PAIR)), PAIR), prepared())
+        assert_identical(from_bytes(to_bytes(from_bytes(STORED, PAIR)), PAIR), fitted())
 
     def test_the_keys_are_not_stored(self) -> None:
         for array in (PAIR.key0, PAIR.key1):
@@ -95,7 +95,7 @@ class TestFingerprint:
     def test_of_equal_pairs(self) -> None:
         again = KeyPair.checked(POINTS.tolist(), (1.1 * POINTS).tolist(), FACES.astype(np.int32), [[0, 5]])
         assert fingerprint(again) == fingerprint(PAIR)
-        assert_identical(from_bytes(STORED, PAIR), prepared())
+        assert_identical(from_bytes(STORED, PAIR), fitted())
 
     @pytest.mark.parametrize(
         "other",
@@ -117,12 +117,12 @@ class TestFingerprint:
 class TestDamage:
     @pytest.mark.parametrize("data", [b"", b"PK", b"no map at all", bytes(1000), STORED[:-1], STORED[1:], STORED[::-1]])
     def test_foreign_bytes_are_refused(self, data: bytes) -> None:
-        with pytest.raises(InputError, match="prepare the keys again"):
+        with pytest.raises(InputError, match="fit the keys again"):
             from_bytes(data, PAIR)
 
-    @pytest.mark.parametrize("data", [pickle.dumps(prepared().maps), b"\x93NUMPY" + bytes(100)])
+    @pytest.mark.parametrize("data", [pickle.dumps(fitted().maps), b"\x93NUMPY" + bytes(100)])
     def test_other_formats_of_numpy_are_refused(self, data: bytes) -> None:
-        with pytest.raises(InputError, match="prepare the keys again"):
+        with pytest.raises(InputError, match="fit the keys again"):
             from_bytes(data, PAIR)
 
     @settings(max_examples=300)
@@ -143,13 +143,13 @@ class TestDamage:
     @settings(max_examples=100)
     @given(st.integers(0, len(STORED) - 1))
     def test_cut_off(self, length: int) -> None:
-        with pytest.raises(InputError, match="prepare the keys again"):
+        with pytest.raises(InputError, match="fit the keys again"):
             from_bytes(STORED[:length], PAIR)
 
     @settings(max_examples=100)
     @given(st.binary(max_size=300))
     def test_anything(self, data: bytes) -> None:
-        with pytest.raises(InputError, match="prepare the keys again"):
+        with pytest.raises(InputError, match="fit the keys again"):
             from_bytes(data, PAIR)
 
 
@@ -168,17 +168,17 @@ class TestWrongContents:
             from_bytes(sealed(found), PAIR)
 
     def test_nothing_changed(self) -> None:
-        assert_identical(from_bytes(sealed(contents(STORED)), PAIR), prepared())
+        assert_identical(from_bytes(sealed(contents(STORED)), PAIR), fitted())
 
     def test_another_version(self) -> None:
         header = {**contents(STORED)["header"], "version": 99}
-        self.refused("has format 99, this version reads 1; prepare", header=header)
+        self.refused("has format 99, this version reads 2; fit the keys", header=header)
 
     @pytest.mark.parametrize("name", ["header", "points", "tets", "maps", "turns"])
     def test_a_part_is_missing(self, name: str) -> None:
         self.refused("damaged", **{name: None})
 
-    @pytest.mark.parametrize("name", ["version", "fingerprint", "engine", "notes", "extra_turns"])
+    @pytest.mark.parametrize("name", ["version", "fingerprint", "engine", "notes", "options"])
     def test_a_part_of_the_header_is_missing(self, name: str) -> None:
         header = contents(STORED)["header"]
         del header[name]

@@ -10,25 +10,27 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.arrays import Floats
-from qc3d_addon.solver.frames.chain import Bake, chain_inbetweens, evenly_spaced, finish, prepare
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.frames.bake import Bake, evenly_spaced
 from qc3d_addon.solver.frames.measures import worst_excess
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
 
+from ..baking import frames_of
 from ..meshes import icosphere
 
-SETTINGS = Settings(engine="delaunay", quality="normal")
+NORMAL = FitOptions()
 TURN = rotation_matrices(np.array([[0.3, -0.4, 0.5]]))[0]
 
 
 def chain(*shapes: Floats, mode: str = "natural") -> Bake:
     """The bake with one in-between of every two shapes of the sphere."""
     faces = icosphere(2)[1]
-    settings = Settings(engine="delaunay", quality="normal", mode=mode)  # type: ignore[arg-type]
     pairs = [KeyPair.checked(first, second, faces) for first, second in pairwise(shapes)]
-    prepared = [finish(prepare(pair, SETTINGS)) for pair in pairs]
-    return finish(chain_inbetweens(prepared, evenly_spaced(2 * len(pairs) - 1), settings))
+    fitted = [finish(fit_pair(pair, NORMAL)) for pair in pairs]
+    return frames_of(fitted, evenly_spaced(2 * len(pairs) - 1), mode)
 
 
 def test_a_sphere_that_grows_and_turns() -> None:
@@ -69,7 +71,7 @@ class TestWorstExcess:
     def test_within_the_keys(self) -> None:
         pair = self.pair()
         frames = np.stack([pair.key0, 0.5 * (pair.key0 + pair.key1), pair.key1])
-        assert worst_excess(pair, frames).ratio == pytest.approx(0.0, abs=1e-15)
+        assert worst_excess(pair, frames).excess == pytest.approx(0.0, abs=1e-15)
 
     def test_longer_and_shorter(self) -> None:
         pair = self.pair()
@@ -77,12 +79,12 @@ class TestWorstExcess:
         longer[1, 0] = 3.0  # the edge is 1 to 2 long in the keys
         shorter[2, 1] = 0.25  # and this one 1
         found = worst_excess(pair, np.stack([pair.key0, longer]))
-        assert (found.ratio, found.frame) == (pytest.approx(0.5), 1)
+        assert (found.excess, found.frame) == (pytest.approx(0.5), 1)
         found = worst_excess(pair, np.stack([longer, shorter, pair.key0]))
-        assert (found.ratio, found.frame) == (pytest.approx(0.75), 1)
+        assert (found.excess, found.frame) == (pytest.approx(0.75), 1)
         assert found.vertex in (0, 2)
 
     def test_no_edges(self) -> None:
         points = np.eye(3)
         pair = KeyPair(points, points, np.empty((0, 3), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
-        assert worst_excess(pair, points[None]).ratio == 0.0
+        assert worst_excess(pair, points[None]).excess == 0.0

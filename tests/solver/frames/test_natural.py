@@ -12,15 +12,18 @@ import pytest
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.collision.crossings import crossing_pairs
-from qc3d_addon.solver.fit.fitted_map import PreparedMap
-from qc3d_addon.solver.frames.chain import Bake, finish, inbetweens, prepare
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.frames.bake import Bake
 from qc3d_addon.solver.keys.embedding import RigidMotion
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.numerics.symmetric_matrices import Stretch
-from qc3d_addon.solver.settings import Settings, StretchLaw
+from qc3d_addon.solver.settings import FitOptions, StretchLaw
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.triangles.topology import sides, unique_edges
 
+from ..baking import frames_of
 from ..meshes import arced, bent, box_surface, enclosed_volume, icosphere, twisted
 
 pytestmark = pytest.mark.usefixtures("coarse_volume")
@@ -28,16 +31,16 @@ pytestmark = pytest.mark.usefixtures("coarse_volume")
 LENGTH = 5.0
 BAR, FACES = box_surface((2, 2, 16), (1.0, 1.0, LENGTH))
 TIMES = [0.0, 0.2, 0.5, 0.8, 1.0]
-NORMAL = Settings(engine="delaunay", quality="normal")
+NORMAL = FitOptions()
 
 
 def baked(
     key0: Floats, key1: Floats, faces: Ints, times: list[float], extra_turns: int = 0, law: StretchLaw = "linear"
 ) -> Bake:
     choice = replace(NORMAL, stretch=law, extra_turns=extra_turns)
-    prepared = finish(prepare(KeyPair.checked(key0, key1, faces), choice))
-    bake = finish(inbetweens(prepared, times, choice))
-    assert not any(bake.report["folds"]["frames"])
+    fitted = finish(fit_pair(KeyPair.checked(key0, key1, faces), choice))
+    bake = frames_of(fitted, times)
+    assert not any(bake.report.folds.frames)
     return bake
 
 
@@ -173,7 +176,7 @@ class TestExtraTurns:
 
     def test_a_note_where_they_change_nothing(self) -> None:
         bake = baked(BAR, arced(BAR, 0.5), FACES, [0.5], extra_turns=1)
-        assert any("extra turns change nothing" in note for note in bake.report["notes"])
+        assert any("extra turns change nothing" in note for note in bake.report.notes)
         plain = baked(BAR, arced(BAR, 0.5), FACES, [0.5])
         np.testing.assert_array_equal(bake.frames, plain.frames)
 
@@ -186,12 +189,12 @@ PAIRS = {
 
 
 @cache
-def prepared_once(name: str) -> PreparedMap:
-    return finish(prepare(KeyPair.checked(*PAIRS[name]), NORMAL))
+def prepared_once(name: str) -> FittedMap:
+    return finish(fit_pair(KeyPair.checked(*PAIRS[name]), NORMAL))
 
 
 def frames_at(name: str, times: list[float]) -> Floats:
-    return finish(inbetweens(prepared_once(name), times, NORMAL)).frames
+    return frames_of(prepared_once(name), times).frames
 
 
 class TestTime:

@@ -11,9 +11,10 @@ import pytest
 
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames import task as tasks
-from qc3d_addon.solver.frames.chain import Bake, finish
+from qc3d_addon.solver.frames.bake import Bake
 from qc3d_addon.solver.frames.task import Task, carry_out
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FrameOptions
+from qc3d_addon.solver.support.progress import finish
 
 from ..meshes import box_surface, twisted
 
@@ -23,11 +24,11 @@ NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
 def straight(through: tuple[str, ...], times: list[float], **choices: str) -> Bake:
-    settings = Settings(mode="straight", **choices)  # type: ignore[arg-type]
-    task = Task.of_keys(SHAPES, FACES, NO_EDGES, through, settings, np.array(times))
-    assert task.new_maps == 0
+    options = FrameOptions("straight", **choices)  # type: ignore[arg-type]
+    task = Task.of_keys(SHAPES, FACES, NO_EDGES, through, frame_options=options, times=times)
+    assert task.new_fits == 0
     outcome = finish(carry_out(task))
-    assert outcome.maps == {}
+    assert outcome.fits == {}
     assert outcome.bake is not None
     return outcome.bake
 
@@ -35,8 +36,8 @@ def straight(through: tuple[str, ...], times: list[float], **choices: str) -> Ba
 def test_frames_are_on_the_lines() -> None:
     bake = straight(("a", "c"), [0.0, 0.25, 1.0])
     np.testing.assert_array_equal(bake.frames, [BAR, BAR + 0.25 * (SHAPES["c"] - BAR), SHAPES["c"]])
-    assert json.loads(json.dumps(bake.report, allow_nan=False))["residual"] is None
-    assert bake.report["worst_stretch"]["excess"] == pytest.approx(0.5)  # edges across are half as long
+    assert json.loads(json.dumps(bake.report.as_json(), allow_nan=False))["residual"] is None
+    assert bake.report.worst_stretch.excess == pytest.approx(0.5)  # edges across are half as long
 
 
 def test_a_chain_with_easing_meets_every_key() -> None:
@@ -50,22 +51,22 @@ def test_a_chain_with_easing_meets_every_key() -> None:
 @pytest.mark.parametrize("scale", [1e-74, 1e-30, 1e30, 1e74])
 def test_keys_of_any_size(scale: float) -> None:
     shapes = {name: scale * shape for name, shape in SHAPES.items()}
-    task = Task.of_keys(shapes, FACES, NO_EDGES, ("a", "b"), Settings(mode="straight"), np.array([0.5]))
+    task = Task.of_keys(shapes, FACES, NO_EDGES, ("a", "b"), frame_options=FrameOptions("straight"), times=[0.5])
     with np.errstate(all="raise", under="ignore"):
         bake = finish(carry_out(task)).bake
     assert bake is not None
-    assert bake.report["crossings"] == straight(("a", "b"), [0.5]).report["crossings"]
+    assert bake.report.crossings == straight(("a", "b"), [0.5]).report.crossings
 
 
 def test_no_map_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tasks, "prepare", None)
+    monkeypatch.setattr(tasks, "fit_pair", None)
     straight(("a", "b"), [0.5])
 
 
 @pytest.mark.parametrize("mode", ["straight", "natural", "linear"])
 @pytest.mark.parametrize("time", [1.5, float("nan")])
 def test_times_that_are_none_are_refused_before_any_work(mode: str, time: float) -> None:
-    settings = Settings(mode=mode)  # type: ignore[arg-type]
-    steps = carry_out(Task.of_keys(SHAPES, FACES, NO_EDGES, ("a", "b"), settings, np.array([time])))
+    options = FrameOptions(mode)  # type: ignore[arg-type]
+    steps = carry_out(Task.of_keys(SHAPES, FACES, NO_EDGES, ("a", "b"), frame_options=options, times=[time]))
     with pytest.raises(InputError, match="from 0"):
         next(steps)

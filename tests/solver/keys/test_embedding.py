@@ -31,6 +31,14 @@ def bar_pair(turn: Floats, shift: Floats, angle: float = 0.6) -> KeyPair:
     return KeyPair.checked(points, rigidly_moved(bent(points, angle), turn, shift), faces)
 
 
+def plate_with_wings(plate: Floats, angle: float) -> Floats:
+    """A plate along y whose outer thirds are turned up by ``angle`` (radians) about the x axis."""
+    inner = np.ptp(plate[:, 1]) / 6.0
+    hinge = np.sign(plate[:, 1:2]) * inner * np.array([0.0, 1.0, 0.0])
+    turns = np.outer(angle * np.sign(plate[:, 1]) * (np.abs(plate[:, 1]) > inner), [1.0, 0.0, 0.0])
+    return np.asarray(np.einsum("nij,nj->ni", rotation_matrices(turns), plate - hinge) + hinge)
+
+
 class TestRigidMotion:
     @given(seeds, vectors, angles, st.floats(0.0, 10.0))
     def test_a_rigid_motion_is_recovered(self, seed: int, axis: Floats, angle: float, far: float) -> None:
@@ -110,6 +118,46 @@ class TestRigidMotion:
         np.testing.assert_allclose(motion.apply(source), target, rtol=0.0, atol=1e-10)
 
 
+class TestMotionOfASurface:
+    @given(seeds, vectors, angles)
+    def test_a_rigid_motion_is_recovered(self, seed: int, axis: Floats, angle: float) -> None:
+        points, faces = icosphere(1)
+        points = points + 0.1 * np.random.default_rng(seed).normal(size=points.shape)
+        turn = angle * axis / max(np.linalg.norm(axis), 1e-3)
+        target = rigidly_moved(points, turn, 3.0 * axis)
+        motion = RigidMotion.of_surface(points, target, faces)
+        np.testing.assert_allclose(motion.apply(points), target, rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(motion.turn, turn, rtol=0.0, atol=1e-11)
+
+    @pytest.mark.parametrize("lift", [0.0, 0.01])
+    @pytest.mark.parametrize("angle", [0.3, 0.7, 1.5])
+    def test_wings_that_flap_do_not_turn_the_body_over(self, angle: float, lift: float) -> None:
+        plate, faces = box_surface((2, 20, 2), (1.0, 8.0, 0.2))
+        down, up = (plate_with_wings(plate, sign * angle) for sign in (-1.0, 1.0))
+        motion = RigidMotion.of_surface(down, up + [0.0, 0.0, lift], faces)
+        # The diagonals of the hinges' faces are not symmetric.
+        np.testing.assert_allclose(motion.turn, 0.0, rtol=0.0, atol=0.01)
+
+    def test_ends_that_twist_more_than_half_a_turn_either_way_cancel_out(self) -> None:
+        bar, faces = box_surface((3, 3, 31), (1.0, 1.0, 5.0))
+        turns = np.outer(np.radians(440.0) * (bar[:, 2] / 5.0 - 0.5), [0.0, 0.0, 1.0])
+        motion = RigidMotion.of_surface(bar, np.einsum("nij,nj->ni", rotation_matrices(turns), bar), faces)
+        np.testing.assert_allclose(motion.turn, 0.0, rtol=0.0, atol=1e-9)
+
+    def test_there_and_back_are_one_motion(self) -> None:
+        points, faces = box_surface((2, 2, 8), (1.0, 0.7, 4.0))
+        other = 2.0 * rigidly_moved(bent(points, 1.0), np.array([0.5, -1.0, 0.8]), np.ones(3))
+        there, back = (RigidMotion.of_surface(*ends, faces) for ends in ((points, other), (other, points)))
+        np.testing.assert_allclose(there.turn, -back.turn, rtol=0.0, atol=1e-11)
+
+    def test_without_triangles_the_points_tell(self) -> None:
+        points = np.random.default_rng(0).normal(size=(10, 3))
+        turn = np.array([0.5, -1.0, 0.8])
+        for faces in (np.empty((0, 3), dtype=np.int64), np.zeros((2, 3), dtype=np.int64)):
+            motion = RigidMotion.of_surface(points, rigidly_moved(points, turn, np.ones(3)), faces)
+            np.testing.assert_allclose(motion.turn, turn, rtol=0.0, atol=1e-12)
+
+
 class TestEmbedding:
     @given(seeds, st.sampled_from([1e-6, 1.0, 1e6]), vectors)
     def test_both_keys_lie_in_the_cube_and_touch_its_margin(self, seed: int, size: float, place: Floats) -> None:
@@ -153,7 +201,7 @@ class TestEmbedding:
 
     def test_what_is_left_has_no_rotation(self) -> None:
         embedding = Embedding.of(bar_pair(np.array([0.5, -1.0, 0.8]), np.array([3.0, 4.0, -5.0])))
-        left = RigidMotion.between(embedding.key0, embedding.key1, embedding.weights)
+        left = RigidMotion.of_surface(embedding.key0, embedding.key1, embedding.pair.faces)
         np.testing.assert_allclose(left.turn, 0.0, rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(left.velocity, 0.0, rtol=0.0, atol=1e-12)
 

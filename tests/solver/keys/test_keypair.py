@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from qc3d_addon.solver.errors import InputError, QC3DError
+from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.keys.keypair import KeyPair
-from qc3d_addon.solver.settings import Settings
 
 from ..meshes import icosphere
 
@@ -74,30 +73,3 @@ class TestKeyPair:
         with pytest.raises(InputError, match="one plane"):
             KeyPair.checked(POINTS, flat, FACES)
         KeyPair.checked(size * POINTS, size * (POINTS * [1, 1, 1e-4] + 5.0), FACES)
-
-
-class TestSettings:
-    def test_defaults(self) -> None:
-        assert Settings() == Settings(mode=Settings().mode, engine="delaunay", quality="normal", seed=0)
-
-    @pytest.mark.parametrize(
-        ("choice", "sentence"),
-        [
-            ({"mode": "cubic"}, "Unknown mode 'cubic'; choose one of "),
-            ({"engine": "tetgen"}, "Unknown engine 'tetgen'; choose one of auto, tetwild, delaunay."),
-            ({"quality": "best"}, "Unknown quality 'best'; choose one of normal, fine, finest."),
-            ({"mesh_time_limit": 0.0}, "The time limit of meshing is 0.0 s; it must be positive."),
-            ({"mesh_time_limit": float("nan")}, "The time limit of meshing is nan s"),
-            ({"seed": -1}, "The seed is -1; it must be 0 or more."),
-        ],
-    )
-    def test_refused_with_a_sentence(self, choice: dict[str, Any], sentence: str) -> None:
-        with pytest.raises(InputError, match=re.escape(sentence)):
-            Settings(**choice)
-
-    def test_the_paper_is_selectable(self) -> None:
-        assert Settings(mode="linear").mode == "linear"
-
-
-def test_input_errors_are_meant_for_the_user() -> None:
-    assert issubclass(InputError, QC3DError)

@@ -11,7 +11,7 @@ import pytest
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.files.npz import read_pairs
+from qc3d_addon.solver.keys.files import read_pair
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.keys.orientation import mirrored_share, require_reachable
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
@@ -88,4 +88,4 @@ def test_no_real_pair_is_mirrored(data_folder: Path) -> None:
         with np.load(path) as stored:
             names = stored["shape_names"].tolist()
         for name in names[1:]:
-            assert mirrored_share(read_pairs(path, (names[0], name))[0]) < 0.1, (path, name)
+            assert mirrored_share(read_pair(path, names[0], name)) < 0.1, (path, name)

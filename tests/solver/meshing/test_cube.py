@@ -10,13 +10,14 @@ import pytest
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.errors import MeshingError
 from qc3d_addon.solver.meshing import cube, tetwild_loading
-from qc3d_addon.solver.meshing.cube import FilledCube, engine_available, fill_cube, require_filled_cube
+from qc3d_addon.solver.meshing.cube import FilledCube, fill_cube, require_filled_cube
 from qc3d_addon.solver.meshing.slivers import smallest_dihedral_angles
 from qc3d_addon.solver.meshing.tetwild_loading import unavailable_reason
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import OPPOSITE_FACES, TetMesh
 from qc3d_addon.solver.tets.point_location import interpolation_matrix
 
+from ..baking import engine_available
 from ..meshes import icosphere, jittered_grid, kuhn_grid
 
 NO_FACES = np.empty((0, 3), dtype=np.int64)
@@ -30,7 +31,7 @@ ENGINES = [
 
 
 def fill(points: Floats, faces: Ints, engine: str, **choices: object) -> FilledCube:
-    return fill_cube(points, faces, Settings(engine=engine, **{"quality": "normal", **choices}))  # type: ignore[arg-type]
+    return fill_cube(points, faces, FitOptions(engine=engine, **choices))  # type: ignore[arg-type]
 
 
 def assert_partition_of_the_cube(mesh: TetMesh) -> None:
@@ -167,9 +168,6 @@ def test_auto_rejects_a_mesh_with_a_hole(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_without_pytetwild(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tetwild_loading, "_wrapper", lambda: None)
-    assert not engine_available("tetwild")
-    assert engine_available("delaunay")
-    assert engine_available("auto")
     filled = fill(*icosphere(1, 0.1), "auto")
     assert filled.engine == "delaunay"
     assert filled.notes[0].endswith("pytetwild is not installed for this Python.")

@@ -147,7 +147,7 @@ def test_an_application_is_not_taken_for_an_interpreter(monkeypatch: pytest.Monk
 
 
 def test_finding_the_engine_imports_nothing() -> None:
-    lines = "import sys; from qc3d_addon.solver.meshing.cube import engine_available; engine_available('tetwild'); "
+    lines = "import sys; from qc3d_addon.solver.meshing import tetwild_loading; tetwild_loading.unavailable_reason(); "
     check = lines + "sys.exit(any('tetwild' in name.lower() and 'qc3d' not in name for name in sys.modules))"
     root = Path(tetwild.__file__).resolve().parents[3]
     assert subprocess.run([sys.executable, "-c", check], cwd=root, env={**os.environ}).returncode == 0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
 from qc3d_addon.solver.numerics.rotation_unwrapping import Turning, consistent_turning, swing_beside
 from qc3d_addon.solver.numerics.rotations import rotation_matrices, rotation_vectors
-from qc3d_addon.solver.surface.deformation import TriangleDeformation
+from qc3d_addon.solver.triangles.deformation import TriangleDeformation
 from qc3d_addon.solver.triangles.topology import face_adjacency
 
 from ..meshes import bent, box_surface, twisted

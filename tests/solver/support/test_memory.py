@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.frames.chain import evenly_spaced
+from qc3d_addon.solver.frames.bake import evenly_spaced
 from qc3d_addon.solver.frames.task import Task
-from qc3d_addon.solver.settings import Settings
 from qc3d_addon.solver.support.memory import estimated_mb, machine_limit_mb, require_memory
 
 KEYS = ("Basis", "Up")
@@ -51,7 +50,7 @@ def test_a_million_vertices_are_refused_before_anything_starts() -> None:
     points = np.random.default_rng(0).uniform(size=(1_000_000, 3))
     faces = np.arange(999_999).reshape(-1, 3)
     no_edges = np.empty((0, 2), dtype=np.int64)
-    task = Task.of_keys({"Basis": points, "Up": points * 2.0}, faces, no_edges, KEYS, Settings(), evenly_spaced(5))
+    task = Task.of_keys({"Basis": points, "Up": points * 2.0}, faces, no_edges, KEYS, times=evenly_spaced(5))
     with pytest.raises(InputError, match=r"The bake of 1000000 vertices needs about 5\d{3} MB .* its limit is 4096 MB"):
         task.require_memory(4096)
     task.require_memory(12_000)

@@ -12,20 +12,20 @@ from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair
 from ..keys.orientation import require_reachable
 from ..meshing.cube import fill_cube
-from ..settings import Settings
+from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
 from ..tets.point_location import interpolation_matrix
 from .continuation import follow_path, path_to
-from .fitted_map import PreparedMap
+from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
 
 # Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
 _LARGE_RESIDUAL = 0.03
 
 
-def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
+def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
 
     Raises
@@ -44,9 +44,9 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
     yield Progress("mesh", 0.0)
-    with beside(partial(_way, embedding, settings, seconds)) as way:
+    with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, pair.faces, settings)
+            filled = fill_cube(embedding.key0, pair.faces, options)
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
@@ -58,19 +58,20 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
         followed = yield from staged("fit", follow_path(fitter, targets))
     yield Progress("fit", 1.0)
-    prepared = PreparedMap(
+    fitted = FittedMap(
         pair,
         filled.mesh,
         followed.maps,
         followed.turns,
-        settings.extra_turns,
+        options,
         filled.engine,
-        settings.quality,
+        embedding,
+        landmarks,
         filled.notes,
         seconds,
-        {settings.stretch: path},
+        path,
     )
-    missed = prepared.landmark_residual()["rms"]
+    missed = fitted.landmark_residual().rms
     if path.inside_out:
         note = (
             f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
@@ -82,14 +83,14 @@ def prepare(pair: KeyPair, settings: Settings) -> Steps[PreparedMap]:
             "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
         )
     else:
-        return prepared
-    return replace(prepared, notes=(*filled.notes, note))
+        return fitted
+    return replace(fitted, notes=(*filled.notes, note))
 
 
-def _way(embedding: Embedding, settings: Settings, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
+def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
     """The surface's own path to the second key, and the shapes on it that lead the map."""
     with timed(seconds, "path"):
-        path = SurfacePath(embedding, settings.stretch, settings.extra_turns != 0)
+        path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
         return path, path_to(path, embedding.key1)
 
 

@@ -14,15 +14,9 @@ from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.numerics.assembly import gradient_operator
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.settings import StretchLaw
-from qc3d_addon.solver.surface.deformation import (
-    TriangleDeformation,
-    closest_tangents,
-    face_normals,
-    hat_gradients,
-    stretched,
-    tangent_bases,
-    tangents_of,
-)
+from qc3d_addon.solver.surface.tangents import closest_tangents, stretched, tangents_of
+from qc3d_addon.solver.triangles.deformation import TriangleDeformation
+from qc3d_addon.solver.triangles.geometry import face_normals, hat_gradients, tangent_bases
 
 from ..meshes import enclosed_volume, icosphere, twisted
 

@@ -4,17 +4,11 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import bpy
-
-from ..solver.errors import InputError
-
-_LONGEST_PATH = 1023  # bytes; what Blender is given beyond that it cuts off, without a word
 
 
 @contextmanager
@@ -27,18 +21,6 @@ def interruptible() -> Iterator[None]:
     finally:
         # None where the handler is Blender's own, which Python cannot put back; then the next Ctrl-C ends Blender.
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-
-
-def require_short(path: Path, shown: Path) -> None:
-    """Refuse a name that Blender would cut off, and so write or read another file; the error calls it ``shown``."""
-    if len(os.fsencode(path)) > _LONGEST_PATH:
-        raise InputError(f"{shown} is too long a name for Blender; choose a folder with a shorter one.")
-
-
-def words(error: RuntimeError, new: Path, shown: Path) -> str:
-    """What an operator of Blender said as a clause; the file that it calls ``new`` is called ``shown``."""
-    text = str(error).removeprefix("Error: ").replace(str(new), str(shown))
-    return " ".join(text.split()).rstrip(".")
 
 
 def register_command(name: str, handler: Callable[[list[str]], int]) -> list[object]:

@@ -11,13 +11,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from qc3d_addon.solver.frames.task import Task
 from qc3d_addon.solver.meshing.tetwild_loading import unavailable_reason
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.worker.client import Worker
 
 from ..worker.test_client import small_task
@@ -158,7 +160,7 @@ def test_where_hang_ups_are_ignored_it_works_on(here: Path, temporary: Path) -> 
     program = PROGRAM.format(lines="signal.signal(signal.SIGHUP, signal.SIG_IGN)").replace(
         "from qc3d_addon.start", "os.kill(os.getpid(), signal.SIGHUP)\nfrom qc3d_addon.start"
     )
-    strike = "\nfrom qc3d_addon.cli import main as command\nread = command.read_pairs\n"
+    strike = "\nfrom qc3d_addon.cli import interpolate as command\nread = command.read_pairs\n"
     strike += "command.read_pairs = lambda *all: (os.kill(os.getpid(), signal.SIGHUP), read(*all))[1]\n"
     program = program.replace("from qc3d_addon.start", f"{strike}from qc3d_addon.start")
     arguments = [*INTERPOLATE, "--mode", "straight"]
@@ -224,9 +226,8 @@ class TestTheRealEngine:
         wait_for(lambda: not list(temporary.iterdir()), "the folder is there")
 
 
-def _with_tetwild() -> object:
-    task = small_task("finest")
-    return type(task)(**{**task.__dict__, "settings": Settings(engine="tetwild", quality="finest")})
+def _with_tetwild() -> Task:
+    return replace(small_task("finest"), fit_options=FitOptions(engine="tetwild", quality="finest"))
 
 
 class TestSeveralAtOnce:
@@ -335,7 +336,7 @@ class TestFullTemporaryDisks:
         from qc3d_addon.worker import client
 
         task = small_task()
-        task = type(task)(**{**task.__dict__, "times": np.linspace(0.0, 1.0, 402)})
+        task = replace(task, times=np.linspace(0.0, 1.0, 402))
         before = resource.getrlimit(resource.RLIMIT_FSIZE)
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
         try:

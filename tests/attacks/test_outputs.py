@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 
 import contact_sheet
-from qc3d_addon.cli import main as command_line
-from qc3d_addon.solver.files.atomic import replacing
+from qc3d_addon.cli import interpolate
+from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.files.atomic import replacing, require_writable
 
 from .commands import (
     COMMANDS,
@@ -95,7 +96,7 @@ class TestWhatIsNoFile:
 
     @pytest.mark.parametrize("make", NO_FILES)
     def test_is_refused_where_it_comes_during_the_work(self, make: Callable[[Path], None], here: Path) -> None:
-        with pytest.raises(command_line.InputError, match="is a device"), replacing(here / "new.npz") as new:  # noqa: PT012
+        with pytest.raises(InputError, match="is a device"), replacing(here / "new.npz") as new:  # noqa: PT012
             new.write_text("whole")
             make(here / "new.npz")
             before = listing(here)
@@ -133,14 +134,14 @@ class TestWhatIsHalfDone:
     def test_is_where_nobody_else_can_reach_it(self, here: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
         """A name that can be told before, or that is free for a moment, is a place to put a link to another file."""
         seen = []
-        write = command_line.write_frames
+        write = interpolate.write_frames
 
         def spy(path: Path, *rest: object) -> None:
             assert not path.exists()
             seen.append(path)
             write(path, *rest)
 
-        monkeypatch.setattr(command_line, "write_frames", spy)
+        monkeypatch.setattr(interpolate, "write_frames", spy)
         for _ in range(2):
             assert run(*command("interpolate", "new.npz"))[0] == 0
         assert seen[0] != seen[1]
@@ -321,7 +322,7 @@ class TestWhatIsReplaced:
         output = unprivileged / "new.json"
         output.write_text("earlier")
         output.chmod(0o444)
-        with pytest.raises(command_line.InputError, match="cannot be written: Permission denied"), replacing(output):
+        with pytest.raises(InputError, match="cannot be written: Permission denied"), replacing(output):
             pass
         assert output.read_text() == "earlier"
         assert os.listdir(unprivileged) == ["new.json"]
@@ -338,8 +339,8 @@ class TestWhatIsReplaced:
         (shared / "new.json").write_text("theirs")
         (shared / "new.json").chmod(0o666)
         os.seteuid(user)
-        with pytest.raises(command_line.InputError, match="Operation not permitted"):
-            command_line.require_writable(shared / "new.json")
+        with pytest.raises(InputError, match="Operation not permitted"):
+            require_writable(shared / "new.json")
         assert (shared / "new.json").read_text() == "theirs"
 
 

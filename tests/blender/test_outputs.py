@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import pytest
 
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.settings import FitOptions
 
 from ..attacks.commands import listing
 from ..attacks.conftest import small_disk, temporary  # noqa: F401 - fixtures
@@ -32,7 +32,7 @@ def button(request: pytest.FixtureRequest) -> tuple[Write, str]:
 
 
 @pytest.fixture(autouse=True)
-def baked(figure: bpy.types.Object, quick_map: list[Settings]) -> bpy.types.Object:
+def baked(figure: bpy.types.Object, quick_map: list[FitOptions]) -> bpy.types.Object:
     """The figure with in-betweens."""
     bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=2, mode='linear')
     return figure

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...solver.errors import InputError
-from .. import compat
+from .. import native_files
 from .plan import plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 
 if TYPE_CHECKING:
     from ...solver.support.progress import Progress
 
-_SIZE_OF_OPEN_FILE = 4  # times the file that was opened, which may be compressed, with what the bake adds besides keys
+_TIMES_THE_SIZE = 4  # of the file that was opened, which may be compressed, for what the bake adds besides keys
 
 OnProgress = Callable[["Progress"], None]
 
@@ -83,6 +83,7 @@ def bake_file(
     require_writable(output, *reports)
     require_writable(*reports, inputs=[path])
     _open(path)
+    size = path.stat().st_size
     obj = bpy.data.objects.get(object_name)
     if obj is None:
         meshes = ", ".join(f"'{other.name}'" for other in bpy.data.objects if other.type == 'MESH') or "none"
@@ -90,7 +91,7 @@ def bake_file(
     result = bake_object(obj, request, on_progress)
     # Beside their places: Blender writes the paths of images and libraries relative to the file's own folder.
     with replacing_all(output, *reports, beside=True) as (unfinished, *unfinished_reports):
-        _save(unfinished, output, _SIZE_OF_OPEN_FILE * path.stat().st_size + _bytes_of_keys(obj))
+        _save(unfinished, output, _TIMES_THE_SIZE * size + _bytes_of_keys(obj))
         for unfinished_report in unfinished_reports:
             unfinished_report.write_text(json.dumps(result.report, indent=1) + "\n", encoding="utf-8")
     return result
@@ -100,12 +101,12 @@ def _save(new: Path, output: Path, size: int) -> None:
     """Save the file that is open, of about ``size`` bytes, as ``new``, which takes the place of ``output``."""
     from ...solver.files.atomic import require_room
 
-    compat.require_short(new, output)
+    native_files.require_short(new, output)
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(new), copy=True, check_existing=False)
     except RuntimeError as error:
         require_room(output, size)  # Blender calls a full disk a file that is not there
-        raise InputError(f"{output} cannot be written: {compat.words(error, new, output)}.") from error
+        raise InputError(f"{output} cannot be written: {native_files.words(error, new, output)}.") from error
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:
@@ -116,7 +117,7 @@ def _open(path: Path) -> None:
     from ...solver.files.npz import require_file
 
     require_file(path, sys.maxsize)
-    compat.require_short(path.resolve(), path)
+    native_files.require_short(path.resolve(), path)
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:

@@ -10,7 +10,7 @@ import bpy
 
 from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
-from .. import compat
+from .. import compat, native_files
 from ..keys import shape_keys, slider
 from ..store.records import Chain
 
@@ -54,13 +54,13 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         layer.objects.active = copy
         require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:
-            compat.require_short(unfinished, path)
+            native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
                     filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
                 )
             except RuntimeError as error:
-                words = compat.words(error, unfinished, path)
+                words = native_files.words(error, unfinished, path)
                 raise InputError(f"{path} cannot be written: {words}.") from error
             if result != {'FINISHED'}:
                 raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")

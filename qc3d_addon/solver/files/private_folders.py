@@ -26,7 +26,7 @@ _LONGEST_MARK = 10_000  # bytes
 
 
 class PrivateFolder:
-    """A new folder that only this user can read, removed by ``close``.
+    """A new folder that only this user can enter, removed by ``close``; on Windows whoever may enter ``parent`` can.
 
     A file in it, the mark, is locked while the folder is in use and says whose it is. The system frees the lock when
     the process ends, however that happens; every new folder first removes those beside it that nobody uses any more.
@@ -47,9 +47,12 @@ class PrivateFolder:
     """
 
     def __init__(self, parent: Path | None = None) -> None:
-        parent = Path(tempfile.gettempdir() if parent is None else parent)
+        is_temporary = parent is None
+        parent = Path(tempfile.gettempdir()) if parent is None else parent
         remove_abandoned(parent)
-        self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        self.path = Path(os.path.abspath(parent)) / f"{PREFIX}{secrets.token_hex(8)}"
+        # On Windows a file keeps the access rights of the folder that it was made in when it is moved elsewhere.
+        self.path.mkdir(0o777 if sys.platform == "win32" and not is_temporary else 0o700)
         self._mark: BinaryIO | None = None
         try:
             self._mark = (self.path / _MARK).open("x+b", buffering=0)

@@ -157,9 +157,9 @@ def fit(
     >>> import numpy as np, qc3d_addon as qc3d
     >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
     >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    >>> fit = qc3d.fit(corners, 2.0 * corners, faces)
-    >>> fit.inbetweens([0.5]).frames[0, 1].round(3)
-    array([1.5, 0. , 0. ])
+    >>> fit = qc3d.fit(corners, corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], faces)
+    >>> fit.inbetweens([0.5]).frames[0, 1].round(1)
+    array([0.7, 0.7, 0. ])
     """
     return Fit(steps.fit(key0, key1, faces, edges, **options).run(progress))
 

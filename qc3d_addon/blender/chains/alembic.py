@@ -9,10 +9,14 @@ from pathlib import Path
 import bpy
 
 from ...solver.errors import InputError
-from ...solver.files.npz import replacing
-from .. import compat
+from ...solver.files.atomic import replacing, require_room
+from .. import compat, native_files
 from ..keys import shape_keys, slider
 from ..store.records import Chain
+
+# Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
+_BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
+_BYTES_BESIDE = 2**20
 
 
 def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
@@ -48,14 +52,17 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
             other.select_set(False)
         copy.select_set(True)
         layer.objects.active = copy
+        require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:
+            native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
                     filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
                 )
             except RuntimeError as error:
-                raise InputError(f"{path} cannot be written: {error}") from error
-            if result != {'FINISHED'} or not unfinished.exists():
+                words = native_files.words(error, unfinished, path)
+                raise InputError(f"{path} cannot be written: {words}.") from error
+            if result != {'FINISHED'}:
                 raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
     finally:
         action = copy.animation_data and copy.animation_data.action
@@ -70,3 +77,22 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
             other.select_set(True)
         layer.objects.active = active
         scene.frame_set(before[0], subframe=before[1])
+
+
+def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:
+    """More bytes than the file will have. Where the disk gets full, Blender's exporter ends Blender.
+
+    The exporter evaluates modifiers as for a rendering, all but a subdivision surface at the end; the copy is set to
+    show in the viewport what that gives.
+    """
+    shown = [modifier for modifier in copy.modifiers if modifier.show_render]
+    if shown and shown[-1].type == 'SUBSURF' and shown[-1].subdivision_type == 'CATMULL_CLARK':
+        shown.pop()
+    for modifier in copy.modifiers:
+        modifier.show_viewport = modifier in shown
+        if hasattr(modifier, "render_levels"):
+            modifier.levels = modifier.render_levels
+    mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
+    corners = len(mesh.vertices) + len(mesh.loops)
+    once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
+    return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

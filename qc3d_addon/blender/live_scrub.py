@@ -18,13 +18,13 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
-from . import shape_keys
-from .mesh_data import key_coordinates, set_key_coordinates
+from .keys import shape_keys
+from .store.mesh_data import key_coordinates, set_key_coordinates
 
 if TYPE_CHECKING:
-    from ..solver.preview import PreviewCurve
-    from .plans import Plan
-    from .records import Chain
+    from ..solver.frames.preview import PreviewCurve
+    from .bake.plan import Plan
+    from .store.records import Chain
 
 KEY = "QC3D Preview"
 

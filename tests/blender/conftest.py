@@ -14,13 +14,14 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
-from qc3d_addon.blender import records, slider  # noqa: E402
-from qc3d_addon.solver import pipeline, preparation  # noqa: E402
-from qc3d_addon.solver.meshing import FilledCube  # noqa: E402
-from qc3d_addon.solver.pipeline import Progress  # noqa: E402
-from qc3d_addon.solver.settings import Settings  # noqa: E402
-from qc3d_addon.solver.task import Outcome, Task, carry_out  # noqa: E402
-from qc3d_addon.solver.tetmesh import TetMesh  # noqa: E402
+from qc3d_addon.blender.keys import slider  # noqa: E402
+from qc3d_addon.blender.store import records  # noqa: E402
+from qc3d_addon.solver.fit import fit_pair  # noqa: E402
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
+from qc3d_addon.solver.meshing.cube import FilledCube  # noqa: E402
+from qc3d_addon.solver.settings import FitOptions  # noqa: E402
+from qc3d_addon.solver.support.progress import Progress, finish  # noqa: E402
+from qc3d_addon.solver.tets.mesh import TetMesh  # noqa: E402
 from qc3d_addon.worker import client  # noqa: E402
 
 Shapes = dict[str, np.ndarray]
@@ -36,22 +37,22 @@ def addon() -> Iterator[None]:
 
 
 @pytest.fixture
-def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
-    """Fill the cube with six tetrahedra only; the settings of each call.
+def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
+    """Fill the cube with six tetrahedra only; the options of each call.
 
     Their corners are the cube's own, which no map moves: the rest of the solver runs as it is, in milliseconds, and its
     mode ``linear`` gives the straight blend.
     """
     calls = []
 
-    def fill_cube(points: np.ndarray, faces: np.ndarray, settings: Settings) -> FilledCube:
-        calls.append(settings)
+    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions) -> FilledCube:
+        calls.append(options)
         corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
         # Kuhn's six: one for each way round from corner 0 to corner 7 along three edges.
         tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
         return FilledCube(TetMesh(corners, tets), "six", ())
 
-    monkeypatch.setattr(preparation, "fill_cube", fill_cube)
+    monkeypatch.setattr(fit_pair, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
 
@@ -64,7 +65,7 @@ def work_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _work_here(monkeypatch: pytest.MonkeyPatch) -> None:
     def run(task: Task, on_progress: Callable[[Progress], None] | None, limits: object) -> Outcome:
-        return pipeline.finish(carry_out(task), on_progress)
+        return finish(carry_out(task), on_progress)
 
     monkeypatch.setattr(client, "run", run)
 

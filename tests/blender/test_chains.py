@@ -12,8 +12,9 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import compat, kept_measures
-from qc3d_addon.blender.records import PROPERTY, Record
+from qc3d_addon.blender import compat
+from qc3d_addon.blender.store import kept_measures
+from qc3d_addon.blender.store.records import PROPERTY, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 

@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import plans
-from qc3d_addon.blender.colliders import read_colliders
-from qc3d_addon.blender.records import Record
-from qc3d_addon.solver.colliders import Collider
+from qc3d_addon.blender.bake import plan as plans
+from qc3d_addon.blender.bake.colliders import read_colliders
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.collision.colliders import Collider
 
 THROUGH = ("Basis", "Lean")
 State = Callable[[], dict[str, Any]]

@@ -13,9 +13,12 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import shape_keys, slider
-from qc3d_addon.solver import pipeline, task
+from qc3d_addon.blender.keys import shape_keys, slider
 from qc3d_addon.solver.errors import MeshingError
+from qc3d_addon.solver.frames import chain as pipeline
+from qc3d_addon.solver.frames import task
+from qc3d_addon.solver.frames.bake import Bake
+from qc3d_addon.solver.support.progress import Steps
 
 State = Callable[[], dict[str, object]]
 OPERATORS = [bpy.ops.qc3d.bake_inbetweens, bpy.ops.qc3d.prepare]
@@ -244,14 +247,14 @@ class TestLaterFailures:
         value: float,
         said: str,
     ) -> None:
-        chain_inbetweens = pipeline.chain_inbetweens
+        chain_frames = task.chain_frames
 
-        def spoiled(*arguments: object) -> pipeline.Steps[pipeline.Bake]:
-            made = yield from chain_inbetweens(*arguments)
+        def spoiled(*arguments: object) -> Steps[Bake]:
+            made = yield from chain_frames(*arguments)
             made.frames[2, 4, 1] = value
             return made
 
-        monkeypatch.setattr(task, "chain_inbetweens", spoiled)
+        monkeypatch.setattr(task, "chain_frames", spoiled)
         before = state()
         assert said in bake()
         assert state() == before

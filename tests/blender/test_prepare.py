@@ -33,7 +33,7 @@ def reload(folder: Path) -> None:
 def test_a_real_map_survives_saving_and_loading(
     figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work_here: None
 ) -> None:
-    from qc3d_addon.solver import task
+    from qc3d_addon.solver.frames import task
 
     real = {"quality": 'normal', "engine": 'delaunay'}
     assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}
@@ -104,7 +104,7 @@ def test_a_damaged_map_is_refused_and_prepare_heals_it(figure: bpy.types.Object,
     bake()
     (name,) = map_properties()
     figure.data.shape_keys[name] = map_properties()[name][:100]
-    with pytest.raises(RuntimeError, match="The stored map is damaged; prepare the keys again"):
+    with pytest.raises(RuntimeError, match="The stored map is damaged; fit the keys again"):
         bake(count=2)
     bpy.ops.qc3d.prepare(**PAIR)
     bake(count=2)

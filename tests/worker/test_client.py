@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.errors import InputError, MeshingError, QC3DError, WorkerError
-from qc3d_addon.solver.pipeline import Progress, evenly_spaced, finish
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.task import Task, carry_out
+from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.task import Task, carry_out
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import Progress, finish
 from qc3d_addon.worker import client, idleness
 from qc3d_addon.worker.client import Limits, Worker
 
@@ -34,8 +35,8 @@ PATIENCE = 60.0
 def small_task(quality: str = "normal") -> Task:
     points, faces = box_surface((2, 2, 6), (1.0, 1.0, 4.0))
     shapes = {"Basis": points, "Bent": twisted(points, 0.8)}
-    settings = Settings(engine="delaunay", quality=quality)  # type: ignore[arg-type]
-    return Task.of_keys(shapes, faces, np.empty((0, 2), dtype=np.int64), KEYS, settings, evenly_spaced(1))
+    options = FitOptions(quality=quality)  # type: ignore[arg-type]
+    return Task.of_keys(shapes, faces, None, KEYS, options, times=evenly_spaced(1))
 
 
 @pytest.fixture
@@ -307,13 +308,15 @@ def test_no_room_for_the_task(monkeypatch: pytest.MonkeyPatch, temporary: Path) 
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(client, "write_task", no_room)
-    assert "cannot be started in a process of its own: [Errno 28] No space left on device" in str(failure())
+    said = str(failure())
+    assert f"temporary files in {temporary}: No space left on device; make room on that disk" in said
     assert list(temporary.iterdir()) == []
 
 
 def test_no_folder_for_temporary_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    assert "make room in the folder for temporary files" in str(failure())
+    said = str(failure())
+    assert f"temporary files in {tmp_path / 'none'}: No such file or directory; make that folder first" in said
 
 
 def test_no_interpreter(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> None:

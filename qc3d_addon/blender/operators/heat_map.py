@@ -11,9 +11,9 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...solver.errors import QC3DError
-from .. import heat_map, legend
-from ..heat_colours import MEASURE_ITEMS
-from ..shape_keys import owned_keys, slider_owner
+from ..heat_map import heat_map, legend
+from ..heat_map.colors import MEASURE_ITEMS
+from ..keys.shape_keys import owned_keys, slider_owner
 from .common import SLIDER, chosen_chain, poll_chains
 
 

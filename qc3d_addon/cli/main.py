@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command ``qc3d``: in-betweens without Blender's window."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import NoReturn
+
+from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
+from . import analyze, bake, compress, interpolate, reconstruct, reproduce, speech
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns
+    -------
+    0 when it is done; 2 when the input is not usable, with one sentence on standard error; 130 when interrupted.
+    """
+    problem = None
+    try:
+        arguments = _parser().parse_args(argv)
+        arguments.run(arguments)
+    except QC3DError as error:
+        problem = str(error)
+    except MemoryError:
+        problem = "There is not enough memory; use fewer frames, a lower quality or a smaller mesh."
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        problem = on_one_line(f"The system refuses to go on: {with_remedy(error)}{where}.")
+    except RuntimeError as error:
+        if "start new thread" not in str(error):
+            raise
+        problem = "The system allows no more threads; close some programs, or raise the limit (ulimit -u)."
+    except KeyboardInterrupt:
+        speech.note("Interrupted; nothing was written.")
+        return 130
+    finally:
+        speech.flush()  # the texts of --help and --version too
+    unheard = speech.take_unheard()
+    if problem is None and unheard is not None:
+        problem = f"Standard output cannot be written: {reason(unheard)}; all files are complete."
+    if problem is not None:
+        speech.note(problem)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="qc3d", description="In-betweens between shapes of one mesh, through fold-free maps.")
+    parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    for command in (interpolate, bake, analyze, reconstruct, compress, reproduce):
+        command.add_to(commands)
+    return parser
+
+
+def _version() -> str:
+    """The version of the manifest that came with the code: inside the extension, above the package in a checkout."""
+    package = Path(__file__).parent.parent
+    for manifest in (package / "blender_manifest.toml", package.parent / "blender_manifest.toml"):
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
+    return metadata.version("qc3d")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one sentence; argparse alone would print the usage of the whole command before it."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")

@@ -18,7 +18,7 @@ import numpy as np
 
 from qc3d_addon.solver.errors import InputError, QC3DError
 from qc3d_addon.solver.files.atomic import replacing, require_writable
-from qc3d_addon.solver.files.npz import open_archive, read_array, require_file
+from qc3d_addon.solver.files.npz import open_archive, require_file
 from qc3d_paper.drawing.shading import VIEWS, Floats, Ints
 from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
 
@@ -77,7 +77,7 @@ def _read(text: str, arguments: argparse.Namespace) -> Row:
         through = (arguments.first, *arguments.via, arguments.last)
         return _read_blend(label or path.stem, path, arguments.object, through)
     with open_archive(path, "faces, times and frames are needed") as stored:
-        faces, times, frames = (read_array(stored, name, path) for name in ("faces", "times", "frames"))
+        faces, times, frames = stored.read(("faces", "times", "frames")).values()
     numbers = all(array.dtype.kind in "fiu" for array in (faces, times, frames))
     fits = faces.ndim == 2 and faces.shape[1:] == (3,) and frames.ndim == 3 and frames.shape[2:] == (3,)
     if not (numbers and fits and len(frames) and times.shape == (len(frames),)):

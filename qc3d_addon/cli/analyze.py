@@ -60,9 +60,10 @@ def _run(arguments: argparse.Namespace) -> None:
         names += ["surface.npz", "surface.png"]
     require_writable_in(arguments.output, names, [arguments.input, arguments.target])
     if arguments.first is not None:
-        pair = read_pair(arguments.input, arguments.first, arguments.last)
+        options = fit_options(arguments)
+        pair = read_pair(arguments.input, arguments.first, arguments.last, options.quality)
         with StageBars() as bars:
-            fitted = finish(fit_pair(pair, fit_options(arguments)), bars)
+            fitted = finish(fit_pair(pair, options), bars)
         mapping = Mapping(fitted.mesh, fitted.mapped)
     else:
         mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))

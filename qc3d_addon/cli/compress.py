@@ -18,11 +18,12 @@ from ..solver.compression.search import Choice, Compressor
 from ..solver.compression.transfer_loss import transferred
 from ..solver.errors import InputError
 from ..solver.files.atomic import replacing, replacing_all, require_writable
-from ..solver.files.npz import open_archive, read_array, write_arrays
+from ..solver.files.npz import open_archive, write_arrays
 from ..solver.keys.keypair import KeyPair
 from ..solver.maps.boundary_conditions import Conditions
 from ..solver.maps.files import TARGET, TetFile, read_tets, write_tets
 from ..solver.maps.mapping import Mapping
+from ..solver.support.memory import require_memory_for_frames
 from . import speech
 from .options import output_files, whole_number, write_json
 
@@ -126,9 +127,11 @@ def _frames_job(arguments: argparse.Namespace) -> _Job:
     if arguments.scheme != "fitted" or arguments.boundary != "sliding" or arguments.target is not None:
         raise InputError("Frames are compressed by the scheme fitted with a sliding boundary; leave those options out.")
     with open_archive(arguments.map, "faces and frames are needed") as archive:
-        frames, faces = (read_array(archive, name, arguments.map) for name in ("frames", "faces"))
-    if frames.ndim != 3 or frames.dtype.kind not in "fiu" or not len(frames):
-        raise InputError(f"The frames in {arguments.map} must be numbers of the shape (k, n, 3).")
+        header = archive.headers(("frames", "faces"))["frames"]
+        if len(header.shape) != 3 or header.dtype.kind not in "fiu" or not header.rows:
+            raise InputError(f"The frames in {arguments.map} must be numbers of the shape (k, n, 3).")
+        require_memory_for_frames(*header.shape[:2])
+        frames, faces = archive.read(("frames", "faces")).values()
     # Every frame is a key of a pair with the first, and checked as such.
     pairs = [KeyPair.checked(frames[0], frame, faces) for frame in frames]
     positions = np.stack([pair.key1 for pair in pairs])
@@ -146,12 +149,13 @@ def _holds(path: Path, name: str) -> bool:
     if path.suffix.lower() != ".npz":
         return False
     with open_archive(path, "an array of numbers is needed") as archive:
-        return name in archive.files
+        return name in archive
 
 
 def _first_frame(path: Path) -> tuple[Floats, Ints]:
     with open_archive(path, "faces and key0 are needed") as archive:
-        first, faces = (read_array(archive, name, path) for name in ("key0", "faces"))
+        require_memory_for_frames(1, archive.headers(["key0"])["key0"].rows)
+        first, faces = archive.read(("key0", "faces")).values()
     pair = KeyPair.checked(first, first, faces)
     return pair.key0, pair.faces
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.frames.bake import evenly_spaced
 from ..solver.frames.files import write_frames
+from ..solver.frames.modes import needs_fits
 from ..solver.frames.task import Task, carry_out
 from ..solver.keys.files import read_pairs
 from ..solver.settings import FitOptions, FrameOptions
-from ..solver.support.memory import machine_limit_mb
 from ..solver.support.progress import finish
 from .options import (
     add_keys,
@@ -43,10 +43,12 @@ def _run(arguments: argparse.Namespace) -> None:
     files = output_files(arguments)
     require_writable(*files, inputs=[arguments.pair])
     names = key_names(arguments)
-    pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * (len(names) - 1) - 1)
-    task = Task(pairs, names, fit_options(arguments), frame_options(arguments), times)
-    task.require_memory(machine_limit_mb())
+    fit, frame = fit_options(arguments), frame_options(arguments)
+    pairs = read_pairs(
+        arguments.pair, names, frames=len(times), quality=fit.quality, needs_fits=needs_fits(frame.mode)
+    )
+    task = Task(pairs, names, fit, frame, times)
     with StageBars() as bars:
         bake = finish(carry_out(task), bars).bake
     assert bake is not None

@@ -69,9 +69,9 @@ class CrossingSearch:
         low, high = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
         depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
         # What is smaller than the depth crosses nothing: the thousands of triangles of a part that is a point, say.
-        tiny = ((high - low) <= 0.5 * depth).all(axis=0)
-        if tiny.any():
-            low[:, tiny] = np.inf
+        tiny = np.flatnonzero(high[0] - low[0] <= 0.5 * depth)
+        if len(tiny):
+            low[:, tiny[(high[:, tiny] - low[:, tiny] <= 0.5 * depth).all(axis=0)]] = np.inf
         budget = Budget(len(self._faces))
         codes = []
         for first, second in self._tree.meeting(low, high, budget):

@@ -7,14 +7,12 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
-import zlib
 from dataclasses import asdict
 
 import numpy as np
 
 from ..errors import InputError
-from ..files.npz import require_sizes
+from ..files.npz import Archive
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
 from ..settings import FitOptions
@@ -72,20 +70,22 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     if data[:_SEAL_LENGTH] != _seal(data[_SEAL_LENGTH:]):
         raise InputError(_DAMAGED)
     try:
-        with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
-            require_sizes(archive)
-        with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
-            header = json.loads(bytes(stored["header"]))
-            version, owner = header["version"], header["fingerprint"]
-            if version != FORMAT_VERSION:
-                raise InputError(
-                    f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
-                )
-            options, engine = FitOptions(**header["options"]), str(header["engine"])
-            notes = tuple(str(note) for note in header["notes"])
-            points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
-            tets = np.asarray(stored["tets"], dtype=np.int64)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        archive = Archive(io.BytesIO(data[_SEAL_LENGTH:]), "the stored map", "a mesh and maps are needed")
+        stored = archive.read(("header", "points", "maps", "turns", "tets"))
+    except InputError as error:
+        raise InputError(_DAMAGED) from error
+    try:
+        header = json.loads(bytes(stored["header"]))
+        version, owner = header["version"], header["fingerprint"]
+        if version != FORMAT_VERSION:
+            raise InputError(
+                f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
+            )
+        options, engine = FitOptions(**header["options"]), str(header["engine"])
+        notes = tuple(str(note) for note in header["notes"])
+        points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
+        tets = np.asarray(stored["tets"], dtype=np.int64)
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(_DAMAGED) from error
     if owner != fingerprint(pair):
         raise InputError("The stored map belongs to other keys or another mesh; fit the keys again.")

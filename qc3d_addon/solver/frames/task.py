@@ -95,8 +95,9 @@ class Task:
 
     def require_memory(self, limit_mb: float) -> None:
         """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
-        vertices = len(next(iter(self.pairs.values())).key0)
-        needed = estimated_mb(vertices, len(self.pairs), len(self.times), self.fit_options.quality, self.needs_fits)
+        pair = next(iter(self.pairs.values()))
+        vertices, quality = len(pair.key0), self.fit_options.quality
+        needed = estimated_mb(vertices, len(self.pairs), len(self.times), quality, self.needs_fits, len(pair.faces))
         if limit_mb:
             require_memory(needed, limit_mb, vertices)
 

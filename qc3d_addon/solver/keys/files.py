@@ -5,14 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from ..errors import InputError
-from ..files.npz import open_archive, read_array
+from ..files.npz import Archive, Header, open_archive
+from ..settings import Quality
+from ..support.memory import estimated_mb, machine_limit_mb, require_memory
 from .keypair import Ends, KeyPair, consecutive_pairs
 
 
-def read_pairs(path: Path, names: Sequence[str]) -> dict[Ends, KeyPair]:
+def read_pairs(
+    path: Path, names: Sequence[str], *, frames: int = 0, quality: Quality = "normal", needs_fits: bool = True
+) -> dict[Ends, KeyPair]:
     """Read shapes of one mesh: the pair of every two of ``names`` that follow each other, by their names.
 
     Parameters
@@ -22,28 +27,53 @@ def read_pairs(path: Path, names: Sequence[str]) -> dict[Ends, KeyPair]:
         of the names. Other arrays are not looked at; pickled objects are refused.
     names : sequence of str
         Names of two shapes or more, no name twice in a row.
+    frames, quality, needs_fits
+        What is to be made of them: it must fit into the machine's memory, and that is known before they are read.
 
     Raises
     ------
     InputError
-        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys.
+        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if memory would
+        not be enough.
     """
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
-        shape_names = read_array(archive, "shape_names", path)
-        if shape_names.ndim != 1 or shape_names.dtype.kind != "U":
-            raise InputError(f"shape_names in {path} must be a list of texts, a name for each shape.")
-        known = shape_names.tolist()
+        known = _shape_names(archive, path)
         for name in names:
             if name not in known:
                 raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
-        keys = {name: read_array(archive, f"V{known.index(name)}", path) for name in names}
-        faces = read_array(archive, "faces", path)
-    for name, key in keys.items():
-        if key.dtype.kind not in "fiu":
-            raise InputError(f"The shape {name!r} in {path} holds {key.dtype} values; coordinates must be numbers.")
-    return consecutive_pairs(keys, faces, None, names)
+        arrays = {name: f"V{known.index(name)}" for name in names}
+        headers = archive.headers(["faces", *dict.fromkeys(arrays.values())])
+        for name, array in arrays.items():
+            _require_coordinates(headers[array], name, path)
+        vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
+        pairs = len(set(pairwise(names)))
+        needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
+        if limit := machine_limit_mb():
+            require_memory(needed, limit, vertices)
+        found = archive.read(headers)
+    return consecutive_pairs({name: found[array] for name, array in arrays.items()}, found["faces"], None, names)
 
 
-def read_pair(path: Path, first: str, second: str) -> KeyPair:
+def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") -> KeyPair:
     """Two shapes of one mesh by their names; see ``read_pairs``."""
-    return read_pairs(path, (first, second))[first, second]
+    return read_pairs(path, (first, second), quality=quality)[first, second]
+
+
+def _shape_names(archive: Archive, path: Path) -> list[str]:
+    header = archive.headers(["shape_names"])["shape_names"]
+    if len(header.shape) != 1 or header.dtype.kind != "U":
+        raise InputError(f"shape_names in {path} must be a list of texts, a name for each shape.")
+    if header.rows > len(archive.names):
+        raise InputError(
+            f"shape_names in {path} names {header.rows} shapes, and the file holds {len(archive.names)} arrays; "
+            "export it again."
+        )
+    known: list[str] = archive.read(["shape_names"])["shape_names"].tolist()
+    return known
+
+
+def _require_coordinates(header: Header, name: str, path: Path) -> None:
+    if header.dtype.kind not in "fiu":
+        raise InputError(f"The shape {name!r} in {path} holds {header.dtype} values; coordinates must be numbers.")
+    if len(header.shape) != 2 or header.shape[1] != 3:
+        raise InputError(f"The shape {name!r} in {path} has the shape {header.shape}; positions must be (n, 3).")

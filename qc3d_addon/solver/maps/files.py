@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files.atomic import replacing
-from ..files.npz import open_archive, read_array, require_file, write_arrays
+from ..files.npz import open_archive, require_file, write_arrays
+from ..support.memory import require_memory_for_tets
 from ..tets.mesh import TetMesh
 from .mapping import Mapping, checked_mesh
 
@@ -86,10 +87,10 @@ def read_tets(path: Path) -> TetFile:
     """
     if path.suffix.lower() == ".npz":
         with open_archive(path, "points and tets are needed") as archive:
-            arrays: Arrays = {name: read_array(archive, name, path) for name in archive.files}
-        for name in ("points", "tets"):
-            if name not in arrays:
-                raise InputError(f"{path} has no array {name}; it has {', '.join(arrays) or 'none'}.")
+            headers = archive.headers(["points", "tets", *archive.names])
+            held = sum(header.held for header in headers.values())
+            require_memory_for_tets(headers["points"].rows, headers["tets"].rows, held)
+            arrays: Arrays = archive.read(headers)
         points, tets = arrays.pop("points"), arrays.pop("tets")
         rows = {name: len(values) if values.ndim else -1 for name, values in arrays.items()}
         at_vertices = {name: values for name, values in arrays.items() if rows[name] == len(points)}

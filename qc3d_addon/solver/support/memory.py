@@ -14,10 +14,15 @@ from ..settings import Quality
 _MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0}
 _KB_PER_VERTEX = 4.3  # of every pair: the surface's factors and the frames that are worked on at once
 _BYTES_PER_POSITION = 110.0  # of every vertex in every frame: positions, measures, and what makes them
+_MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # of mode straight, where crossings are counted
+_MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # analyze, reconstruct, compress and decompress
+_KB_PER_FRAME, _BYTES_PER_COMPRESSED = 5.0, 220.0
 _SHARE_OF_MACHINE = 0.75
 
 
-def estimated_mb(vertices: int, pairs: int, frames: int, quality: Quality, needs_maps: bool = True) -> float:
+def estimated_mb(
+    vertices: int, pairs: int, frames: int, quality: Quality, needs_maps: bool = True, triangles: int = 0
+) -> float:
     """About the most megabytes that a bake holds at once.
 
     Parameters
@@ -28,11 +33,14 @@ def estimated_mb(vertices: int, pairs: int, frames: int, quality: Quality, needs
         How fine the volume is.
     needs_maps
         Whether there is a map of the volume at all.
+    triangles
+        Of the mesh: where these are more than two for each vertex, they decide.
     """
     positions = vertices * frames * _BYTES_PER_POSITION / 1e6
+    size = max(vertices, triangles / 2)
     if not needs_maps:
-        return positions + _MB_OF_QUALITY["normal"]
-    return positions + pairs * (_MB_OF_QUALITY[quality] + vertices * _KB_PER_VERTEX / 1e3)
+        return positions + _MB_WITHOUT_MAPS + size * _KB_WITHOUT_MAPS / 1e3
+    return positions + pairs * (_MB_OF_QUALITY[quality] + size * _KB_PER_VERTEX / 1e3)
 
 
 def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
@@ -48,6 +56,39 @@ def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
             f"The bake of {vertices} vertices needs about {needed_mb:.0f} MB of memory, and its limit is "
             f"{limit_mb:.0f} MB. Allow it more, take fewer in-betweens or keys, or bake a coarser mesh and carry the "
             "in-betweens over with a Surface Deform modifier."
+        )
+
+
+def require_memory_for_tets(points: int, tets: int, held: int) -> None:
+    """Check that a mesh of tetrahedra, with arrays of ``held`` bytes, can be worked on, before it is read.
+
+    Raises
+    ------
+    InputError
+        If it is too large for this machine.
+    """
+    needed = _MB_OF_A_COMMAND + max(points, tets) * _KB_PER_TET / 1e3 + 2.0 * held / 1e6
+    _require(needed, f"A mesh of {tets} tetrahedra and {points} vertices", "use a coarser mesh")
+
+
+def require_memory_for_frames(frames: int, vertices: int) -> None:
+    """Check that frames can be compressed or restored, before they are read.
+
+    Raises
+    ------
+    InputError
+        If they are too many or too large for this machine.
+    """
+    needed = _MB_OF_A_COMMAND + frames * (_KB_PER_FRAME / 1e3 + vertices * _BYTES_PER_COMPRESSED / 1e6)
+    _require(needed, f"Work on {frames} frames of {vertices} vertices", "use fewer frames or a coarser mesh")
+
+
+def _require(needed_mb: float, what: str, remedy: str) -> None:
+    limit = machine_limit_mb()
+    if limit and needed_mb > limit:
+        raise InputError(
+            f"{what} needs about {needed_mb:.0f} MB of memory, and three quarters of the machine's are {limit} MB; "
+            f"{remedy}."
         )
 
 

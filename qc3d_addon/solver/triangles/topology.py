@@ -54,7 +54,7 @@ def distinct(numbers: Ints) -> Ints:
     ordered = np.sort(numbers)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
-    return ordered[first]
+    return np.asarray(ordered[first])
 
 
 def among(numbers: Ints, known: Ints) -> Bools:

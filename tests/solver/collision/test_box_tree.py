@@ -116,6 +116,8 @@ class TestWork:
         budget.left = 1000
         with pytest.raises(CrowdedError, match=r"lie over each other .* remove triangles that are there many times"):
             list(tree.meeting(corners.min(axis=2), corners.max(axis=2), budget))
+
+
 @pytest.mark.parametrize("chunk", [1, 5, 40])
 def test_chunks_give_the_same(chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(8)

@@ -12,6 +12,7 @@ import pytest
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames.bake import evenly_spaced
 from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.support import memory
 from qc3d_addon.solver.support.memory import estimated_mb, machine_limit_mb, require_memory
 
 KEYS = ("Basis", "Up")
@@ -61,6 +62,46 @@ def test_more_keys_and_frames_need_more() -> None:
     assert estimated_mb(10**5, 3, 7, "fine") > 2.5 * estimated_mb(10**5, 1, 7, "fine")
     assert estimated_mb(10**5, 1, 1000, "fine") > 10_000.0
     assert estimated_mb(10**5, 1, 7, "fine", needs_maps=False) < 300.0
+
+
+@pytest.mark.parametrize(
+    ("vertices", "frames", "measured"), [(27554, 7, 105), (110210, 7, 213), (110210, 62, 488)]
+)
+def test_the_estimate_without_maps(vertices: int, frames: int, measured: float) -> None:
+    assert measured <= estimated_mb(vertices, 1, frames, "normal", needs_maps=False) <= 2.0 * measured + 60.0
+
+
+def test_triangles_count_where_they_are_more_than_usual() -> None:
+    usual = estimated_mb(10**5, 1, 7, "normal", triangles=2 * 10**5)
+    assert usual == estimated_mb(10**5, 1, 7, "normal")
+    assert estimated_mb(10**5, 1, 7, "normal", triangles=10**6) > 4.0 * usual
+    assert estimated_mb(10, 1, 7, "normal", False, triangles=10**7) > 6000.0
+
+
+# Vertices, tetrahedra, and the megabytes of analyze, reconstruct and compress.
+@pytest.mark.parametrize(
+    ("points", "tets", "measured"), [(2197, 10368, 145), (15625, 82944, 286), (68921, 384000, 598)]
+)
+def test_tetrahedra(points: int, tets: int, measured: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    held = 8 * (3 * points + 4 * tets + 6 * tets)
+    monkeypatch.setattr(memory, "machine_limit_mb", lambda: measured)
+    with pytest.raises(InputError, match=rf"A mesh of {tets} tetrahedra .* three quarters of the machine's are"):
+        memory.require_memory_for_tets(points, tets, held)
+    monkeypatch.setattr(memory, "machine_limit_mb", lambda: 3.0 * measured)
+    memory.require_memory_for_tets(points, tets, held)
+    monkeypatch.setattr(memory, "machine_limit_mb", lambda: 0)  # not known
+    memory.require_memory_for_tets(points, 10 * tets, held)
+
+
+@pytest.mark.parametrize(("frames", "vertices", "measured"), [(31, 6890, 132), (31, 27554, 267)])
+def test_frames_to_compress(
+    frames: int, vertices: int, measured: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "machine_limit_mb", lambda: measured)
+    with pytest.raises(InputError, match=rf"Work on {frames} frames of {vertices} vertices needs about"):
+        memory.require_memory_for_frames(frames, vertices)
+    monkeypatch.setattr(memory, "machine_limit_mb", lambda: 2.0 * measured)
+    memory.require_memory_for_frames(frames, vertices)
 
 
 def test_the_sentence_says_what_to_do() -> None:

@@ -46,6 +46,7 @@ MOST_STEPS = 2**40
 # Steps of the search for the nearest map: for the first of a row of maps, and for those that begin at the one before.
 _FIRST_ITERATIONS, _NEXT_ITERATIONS = 60, 20
 _CHECK_TOLERANCE = 1e-6
+_MOST_WORK = 30_000_000  # tetrahedra of maps that are rebuilt for one file: about four minutes of one core
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,16 +209,25 @@ class Codec:
         Raises
         ------
         InputError
-            If there are more modes than this codec has, or the boundary belongs to another mesh.
+            If there are more modes than this codec has, the boundary belongs to another mesh, or so many maps differ
+            that rebuilding them would take too long.
         ReconstructionError
             If a representation is not positive definite, which happens with the scheme ``published``.
         """
-        return np.stack(
-            [
-                reconstruct(self.mesh, self.stretch(compressed, number), self._conditions(held)).values
-                for number, held in enumerate(compressed.held)
-            ]
-        )
+        numbers, held = compressed.numbers, compressed.held
+        changes = (np.diff(numbers, axis=0) != 0).any(axis=(1, 2)) | (np.diff(held, axis=0) != 0.0).any(axis=(1, 2))
+        if (1 + np.count_nonzero(changes)) * len(self.mesh.tets) > _MOST_WORK:
+            raise InputError(
+                f"{1 + np.count_nonzero(changes)} different maps of {len(self.mesh.tets)} tetrahedra take too long to "
+                f"rebuild; at most {_MOST_WORK // len(self.mesh.tets)} are."
+            )
+        maps: list[Floats] = []
+        for number, place in enumerate(held):
+            if number and not changes[number - 1]:
+                maps.append(maps[-1])
+            else:
+                maps.append(reconstruct(self.mesh, self.stretch(compressed, number), self._conditions(place)).values)
+        return np.stack(maps)
 
     def restore(self, compressed: Compressed) -> Floats:
         """(F, n, 3) what was compressed, as nearly as the numbers have it; the boundary exactly.

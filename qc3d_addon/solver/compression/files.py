@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import InputError
 from ..files.npz import require_file, unreadable
+from ..support.memory import require_memory_for_frames
 from .codec import Boundary, Compressed, Scheme
 from .integers import inflated, packed, planes, unpacked
 from .prediction import Predictor
@@ -34,7 +35,9 @@ _HEADER = struct.Struct("<8sHBBB16s8I3d4d")
 _CHECKSUM = struct.Struct("<I")
 _MAGIC, _VERSION = b"QC3DSPEC", 1
 _MOST_BYTES = 2**30
-_MOST_NUMBERS = 2**24
+_MOST_NUMBERS = 2**24  # that are stored
+_MOST_COORDINATES = 2**28  # that the maps have
+_MOST_MODES = 1000
 _KINDS, _SCHEMES, _BOUNDARIES = get_args(Kind), get_args(Scheme), get_args(Boundary)
 
 
@@ -123,6 +126,8 @@ def to_bytes(source: Source, content: Content) -> bytes:
     count += 0 if compressed.remainder is None else compressed.remainder.size
     if count > _MOST_NUMBERS:
         raise InputError(f"{count} numbers are more than one file holds, {_MOST_NUMBERS}; store fewer maps or frames.")
+    if content.modes > _MOST_MODES:
+        raise InputError(f"{content.modes} modes are more than one file may have, {_MOST_MODES}; use fewer.")
     boundary = zlib.compress(np.ascontiguousarray(compressed.held, dtype="<f8").tobytes(), 9)
     numbers = packed(compressed.numbers)
     remainder = b"" if compressed.remainder is None else packed(compressed.remainder, source.predictor)
@@ -177,10 +182,11 @@ def from_bytes(data: bytes, source: Source) -> Content:
     body = data[_HEADER.size : -_CHECKSUM.size]
     sound = (
         count > 0
-        and stored <= modes <= _MOST_NUMBERS
+        and stored <= modes <= _MOST_MODES
         and held <= points
         and rest in (0, points)
         and count * (6 * stored + 3 * held + 3 * rest) <= _MOST_NUMBERS
+        and 3 * count * points <= _MOST_COORDINATES
         and held_bytes + number_bytes <= len(body)
         and np.isfinite(fields[14:]).all()
         and step >= 0.0 <= remainder_step
@@ -188,6 +194,7 @@ def from_bytes(data: bytes, source: Source) -> Content:
     )
     if not sound:
         raise InputError("The compressed maps are damaged, or larger than can be read.")
+    require_memory_for_frames(count, points)
     images = np.frombuffer(inflated(body[:held_bytes], 24 * count * held), "<f8").reshape(count, held, 3)
     if not np.isfinite(images).all():
         raise InputError("The compressed maps hold numbers that are not finite; the file is damaged.")

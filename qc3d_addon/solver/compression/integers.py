@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from ..errors import InputError
 from .prediction import Predictor
 from .range_coder import decoded, encoded
 
+# Numbers that are predicted at once.
+_AT_ONCE = 1 << 20
 # Orders of the differences along the row: none, one for what stays, two for what moves on steadily.
 _ORDERS = 3
 
@@ -25,7 +28,7 @@ def packed(rows: NDArray[np.int64], predictor: Predictor | None = None) -> bytes
     choices = [_differences(rows, order) for order in range(max(min(_ORDERS, len(rows)), 1))]
     order, left = min(enumerate(choices), key=lambda choice: float(np.log2(1 + np.abs(choice[1])).sum()))
     if predictor is not None:
-        left = np.array([predictor.differences(row) for row in left]).reshape(rows.shape)
+        left = _together(predictor.differences, left)
     return bytes([order]) + encoded(left.transpose(0, 2, 1))
 
 
@@ -36,10 +39,24 @@ def unpacked(data: bytes, shape: tuple[int, int, int], predictor: Predictor | No
     count, points, channels = shape
     rows = decoded(data[1:], count * points * channels).reshape(count, channels, points).transpose(0, 2, 1)
     if predictor is not None:
-        rows = np.array([predictor.numbers(row) for row in rows]).reshape(shape)
+        rows = _together(predictor.numbers, rows)
     for _ in range(data[0]):
         rows = np.cumsum(rows, axis=0)
     return np.ascontiguousarray(rows)
+
+
+def _together(
+    predicted: Callable[[NDArray[np.int64]], NDArray[np.int64]], rows: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """What becomes of each row (n, c) of (F, n, c): many short rows side by side cost as little as a few long ones."""
+    count, points, channels = rows.shape
+    size = max(1, _AT_ONCE // max(1, points * channels))
+    made = np.empty_like(rows)
+    for start in range(0, count, size):
+        some = rows[start : start + size]
+        beside = predicted(np.ascontiguousarray(some.transpose(1, 0, 2)).reshape(points, -1))
+        made[start : start + size] = beside.reshape(points, len(some), channels).transpose(1, 0, 2)
+    return made
 
 
 def _differences(rows: NDArray[np.int64], order: int) -> NDArray[np.int64]:

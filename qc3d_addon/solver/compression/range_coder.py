@@ -21,8 +21,9 @@ _CLASSES = 4  # of how large the numbers before were, relative to the bits that 
 _LARGEST_BITS = 50
 _HALF = 1 << 15
 _MEMORY = 60  # how many bits back a model remembers, about
-# What is as good as certain still costs a little: no honest data holds more numbers in a byte.
-MOST_PER_BYTE = 1 << 14
+# What is as good as certain still costs a little: 61 of 65536ths are left to the other bit at last, so that no data
+# holds more numbers in a byte.
+MOST_PER_BYTE = 6000
 
 # Tells or takes a bit that a model expects; None for one that is as likely as not.
 _Bit = Callable[[int, "list[int] | None"], int]
@@ -46,26 +47,33 @@ def decoded(data: bytes, count: int) -> NDArray[np.int64]:
     # The last four bytes may be left out where they are zeros.
     if count > MOST_PER_BYTE * (len(data) + 5):
         raise InputError(f"{len(data)} bytes cannot hold {count} numbers; the file is damaged.")
-    return np.array(_Numbers(_Decoder(data).bit).run([0] * count), dtype=np.int64)
+    decoder = _Decoder(data)
+    return np.array(_Numbers(decoder.bit, decoder.zeros).run([0] * count), dtype=np.int64)
 
 
 class _Numbers:
     """What is told of each number, the same for coding and decoding."""
 
-    def __init__(self, bit: _Bit) -> None:
-        self._bit = bit
+    def __init__(self, bit: _Bit, zeros: Callable[[int, int], int] | None = None) -> None:
+        self._bit, self._zeros = bit, zeros
         # Each model: how likely the bit 0 is, in 65536ths, and how many bits it has seen.
         self._models = [[_HALF, 0] for _ in range((_LARGEST_BITS + 1) * _CLASSES * (_STEPS + 1))]
 
     def run(self, numbers: list[int]) -> list[int]:
         """Code numbers, or, where the bits come from a decoder, put the numbers that they mean in their places."""
         recent = [0] * _WINDOW
-        total = 0
-        for place, number in enumerate(numbers):
-            found = self._number(number, total)
+        total = place = 0
+        while place < len(numbers):
+            if not total and self._zeros is not None and _has_settled(self._models[0]):
+                # Millions of zeros after each other are all that little data can mean: they are taken in one go.
+                place += self._zeros(self._models[0][0], len(numbers) - place)
+                if place == len(numbers):
+                    break
+            found = self._number(numbers[place], total)
             numbers[place] = found
             total += abs(found) - recent[place % _WINDOW]
             recent[place % _WINDOW] = abs(found)
+            place += 1
         return numbers
 
     def _number(self, number: int, total: int) -> int:
@@ -105,6 +113,12 @@ def _learn(model: list[int], bit: int) -> None:
     moved = likely + (2 * ((0 if bit else 1 << 16) - likely)) // (2 * seen + 3)
     model[0] = min(max(moved, 32), (1 << 16) - 32)
     model[1] = min(seen + 1, _MEMORY)
+
+
+def _has_settled(model: list[int]) -> bool:
+    """Whether one more bit 0 would teach the model nothing."""
+    likely, seen = model
+    return seen == _MEMORY and 2 * ((1 << 16) - likely) < 2 * seen + 3
 
 
 class _Encoder:
@@ -150,8 +164,9 @@ class _Encoder:
 
 class _Decoder:
     def __init__(self, data: bytes) -> None:
-        self._data, self._place = data, 4
-        self._code = int.from_bytes(data[:4].ljust(4, b"\0"), "big")
+        # The encoder leaves out zeros among its last four bytes, and nothing is read beyond these.
+        self._data, self._place = data + bytes(4), 4
+        self._code = int.from_bytes(self._data[:4], "big")
         self._range = (1 << 32) - 1
 
     def bit(self, bit: int, model: list[int] | None) -> int:
@@ -165,8 +180,28 @@ class _Decoder:
         if model is not None:
             _learn(model, bit)
         while self._range < 1 << 24:
-            following = self._data[self._place] if self._place < len(self._data) else 0
-            self._place += 1
-            self._code = (self._code << 8 | following) & 0xFFFFFFFF
+            self._code = (self._code << 8 | self._next()) & 0xFFFFFFFF
             self._range <<= 8
         return bit
+
+    def zeros(self, likely: int, most: int) -> int:
+        """Take as many bits 0 as follow each other, up to ``most``, where all are as likely; returns how many."""
+        code, size = self._code, self._range
+        taken = 0
+        while taken < most:
+            bound = (size >> 16) * likely
+            if code >= bound:
+                break
+            size = bound
+            taken += 1
+            while size < 1 << 24:
+                code = (code << 8 | self._next()) & 0xFFFFFFFF
+                size <<= 8
+        self._code, self._range = code, size
+        return taken
+
+    def _next(self) -> int:
+        if self._place >= len(self._data):
+            raise InputError("The data ends before the numbers that it should hold; the file is damaged.")
+        self._place += 1
+        return self._data[self._place - 1]

@@ -54,7 +54,7 @@ def _together(
     made = np.empty_like(rows)
     for start in range(0, count, size):
         some = rows[start : start + size]
-        beside = predicted(np.ascontiguousarray(some.transpose(1, 0, 2)).reshape(points, -1))
+        beside = predicted(np.ascontiguousarray(some.transpose(1, 0, 2)).reshape(points, len(some) * channels))
         made[start : start + size] = beside.reshape(points, len(some), channels).transpose(1, 0, 2)
     return made
 

@@ -87,8 +87,8 @@ def test_nothing_but_a_typed_error_comes_of_any_header(data: st.DataObject) -> N
 
 def test_no_more_numbers_than_bytes_can_hold() -> None:
     data = bytearray(to_bytes(SOURCE, content(maps=1, modes=1, remainder=False)))
-    struct.pack_into("<II", data, 13 + 16 + 4, 2**17, 10)  # modes computed, maps
-    struct.pack_into("<I", data, 13 + 16 + 12, 2**17)  # modes stored
+    struct.pack_into("<II", data, 13 + 16 + 4, 100, 20_000)  # modes computed, maps
+    struct.pack_into("<I", data, 13 + 16 + 12, 100)  # modes stored
     data[-4:] = struct.pack("<I", zlib.crc32(bytes(data[:-4])))
     with pytest.raises(InputError, match="cannot hold"):
         from_bytes(bytes(data), SOURCE)

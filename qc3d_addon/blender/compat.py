@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import bpy
 
@@ -80,14 +80,34 @@ def _fcurves(owner: bpy.types.ID) -> bpy.types.bpy_prop_collection | None:
     return None if channels is None else channels.fcurves
 
 
-def ensure_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
-    """The F-curve of a property, with the action (and slot) made where there is none."""
+def ensure_fcurve(owner: bpy.types.ID, data_path: str, undo: ExitStack) -> bpy.types.FCurve:
+    """The F-curve of a property, with the action (and slot) made where there is none.
+
+    Closing ``undo`` takes back what was made.
+    """
     curve = find_fcurve(owner, data_path)
     if curve is not None:
         return curve
-    animation = owner.animation_data_create()
+    if owner.animation_data is None:
+        owner.animation_data_create()
+        undo.callback(owner.animation_data_clear)
+    animation = owner.animation_data
     if animation.action is None:
         animation.action = bpy.data.actions.new(f"{owner.name}Action")
+        undo.callback(bpy.data.actions.remove, animation.action)
     if hasattr(animation, "action_slot"):
-        return animation.action.fcurve_ensure_for_datablock(owner, data_path)
-    return animation.action.fcurves.new(data_path)
+        undo.callback(_take_back_slots, owner, animation.action_slot, set(animation.action.slots))
+        curve = animation.action.fcurve_ensure_for_datablock(owner, data_path)
+    else:
+        curve = animation.action.fcurves.new(data_path)
+    undo.callback(lambda: _fcurves(owner).remove(find_fcurve(owner, data_path)))
+    return curve
+
+
+def _take_back_slots(
+    owner: bpy.types.ID, chosen: bpy.types.ActionSlot | None, before: set[bpy.types.ActionSlot]
+) -> None:
+    animation = owner.animation_data
+    for slot in [slot for slot in animation.action.slots if slot not in before]:
+        animation.action.slots.remove(slot)
+    animation.action_slot = chosen

@@ -4,24 +4,36 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.errors import InputError
-from . import compat, removal, shape_keys, slider
+from . import chain_memory, compat, removal, shape_keys, slider
 from .records import Chain, Record
 
 
 def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str, frames: range) -> NDArray[np.float64]:
-    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips."""
+    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
+
+    Raises
+    ------
+    InputError
+        If there is no such slider, or it is not a number at one of the frames.
+    """
     scene = context.scene
     current, part = scene.frame_current, scene.frame_subframe
     values = []
     try:
         for frame in frames:
             scene.frame_set(frame)
-            values.append(float(owner.evaluated_get(context.evaluated_depsgraph_get())[name]))
+            evaluated = owner.evaluated_get(context.evaluated_depsgraph_get())
+            slider.require(evaluated, name)
+            values.append(float(evaluated[name]))
+            if np.isnan(values[-1]):
+                raise InputError(f"The slider '{name}' has no value at frame {frame}; mend what animates it first.")
     finally:
         scene.frame_set(current, subframe=part)
     return np.array(values)
@@ -44,25 +56,31 @@ def bake_to_keyframes(
     Raises
     ------
     InputError
-        If the slider is gone, or a key or an action cannot be changed; nothing was changed.
+        If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
     """
     keys = obj.data.shape_keys
-    shape_keys.require_writable(obj, chain, None)
-    action = keys.animation_data and keys.animation_data.action
-    if action and (action.library or action.override_library):
-        raise InputError(f"The action '{action.name}' is linked; make it local first.")
-    owner = shape_keys.slider_owner(obj, chain)
-    if chain.slider not in owner:
-        raise InputError(f"The slider '{chain.slider}' was deleted; re-bake it first.")
+    owner = shape_keys.require_removable(obj, chain)
+    shape_keys.require_action(keys)
+    slider.require(owner, chain.slider)
     places = slider_values(context, owner, chain.slider, frames)
-    for step, key in shape_keys.owned_keys(keys, chain).items():
-        values = key_values(chain, step, places)
+    owned = shape_keys.owned_keys(keys, chain)
+    values = {step: key_values(chain, step, places) for step in owned}
+    notes = []
+    with ExitStack() as undo:
+        curves = {}
+        for step, key in owned.items():
+            curves[step] = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
+            if len(curves[step].keyframe_points):
+                notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
+        chain_memory.forget(keys, record, chain, undo)
+        undo.pop_all()
+    # Nothing below can fail for a reason that was not checked before.
+    removal.hide_heat_map(obj, chain)
+    for step, key in owned.items():
         slider.undrive(key)
-        curve = compat.ensure_fcurve(keys, slider.value_path(key.name))
-        _set_keyframes(curve, np.array(frames, dtype=np.float64), values)
-        key.value = float(values[0])
-    removal.forget_chain(obj, record, chain)
-    notes = removal.remove_slider(owner, chain)
+        _set_keyframes(curves[step], np.array(frames, dtype=np.float64), values[step])
+        key.value = float(values[step][0])
+    notes += removal.remove_slider(owner, chain)
     keys.update_tag()
     context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
     return notes

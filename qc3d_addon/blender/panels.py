@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 
 from ..worker import engines
-from . import checks, jobs, presets, progress
+from . import checks, jobs, presets, progress, records
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens
 from .operators.cancel import QC3D_OT_cancel
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
@@ -49,7 +49,7 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             draw_sentence(context, layout, problem)
             return
         notice = engines.engine_notice() if obj.qc3d.engine != 'delaunay' else None
-        if notice is not None and not checks.has_chains(obj.data.shape_keys):  # else it is said with what was baked
+        if notice is not None and not records.state(obj.data.shape_keys).chains:  # else it is said with what was baked
             draw_sentence(context, layout, notice)
 
 

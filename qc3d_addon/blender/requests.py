@@ -10,6 +10,7 @@ from typing import Any
 from ..solver.errors import InputError
 from ..solver.settings import Settings
 from . import names
+from . import stored_values as stored
 
 # Frames of every two keys that a tolerance chooses from; it has many divisors.
 DENSE_STEPS = 48
@@ -84,10 +85,11 @@ class BakeRequest:
             If it is not what this version writes.
         """
         try:
-            settings = Settings(**remembered["settings"])
-            colliders = str(remembered.get("colliders", ""))
-            return cls(keys, int(remembered["count"]), settings, None, float(remembered["tolerance"]), colliders)
-        except (KeyError, TypeError, ValueError) as error:
+            settings = Settings(**stored.plain_dict(remembered["settings"]))
+            count = stored.whole(remembered["count"], 1, names.MAX_STEPS)
+            tolerance = stored.number(remembered["tolerance"], 0.0)
+            return cls(keys, count, settings, None, tolerance, stored.text(remembered.get("colliders", "")))
+        except (KeyError, TypeError, ValueError, InputError) as error:
             raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
 
 

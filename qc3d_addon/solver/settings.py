@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Literal, get_args
 
 from .easing import Easing
@@ -62,6 +63,14 @@ class Settings:
             value, choices = getattr(self, name), get_args(kind)
             if value not in choices:
                 raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
+        for name, what in (("extra_turns", "number of extra turns"), ("seed", "seed")):
+            value = getattr(self, name)
+            if not isinstance(value, Integral) or isinstance(value, bool):
+                raise InputError(f"The {what} is {value!r}; it must be a whole number.")
+            object.__setattr__(self, name, int(value))  # of numpy's, which JSON does not know
+        limit = self.mesh_time_limit
+        if not isinstance(limit, Real) or isinstance(limit, bool):
+            raise InputError(f"The time limit of meshing is {limit!r}; it must be a number of seconds.")
         if not -100 <= self.extra_turns <= 100:
             raise InputError(f"{self.extra_turns} extra turns are asked for; choose a number from -100 to 100.")
         if self.seed < 0:

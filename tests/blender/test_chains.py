@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -248,10 +249,10 @@ class TestMirror:
         bpy.ops.qc3d.mirror()
         ours, image = Record.read(even.data.shape_keys).chains
         assert image.mirror_of == ours.slider
-        worst = [chain.result["worst"]["vertex"] for chain in (ours, image)]
+        worst = [chain.result.worst.vertex for chain in (ours, image)]
         rest = [np.array(even.data.vertices[vertex].co) for vertex in worst]
         np.testing.assert_allclose(rest[1], rest[0] * [-1, 1, 1], atol=1e-6)
-        assert {**ours.result, "worst": None} == {**image.result, "worst": None}
+        assert replace(ours.result, worst=None) == replace(image.result, worst=None)
         keys, count = even.data.shape_keys, len(even.data.vertices)
         kept = [kept_measures.read(keys, chain.slider, count) for chain in (ours, image)]
         for name in kept_measures.MEASURES:

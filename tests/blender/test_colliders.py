@@ -100,7 +100,7 @@ class TestBake:
         monkeypatch.setattr(bake_inbetweens, "plan_bake", planned)
         assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders="Off") == {'FINISHED'}
         result = Record.read(figure.data.shape_keys).chains[0].result
-        assert result["collider_crossings"] == 0
+        assert result.collider_crossings == 0
         ball.location.x = 3.0
         bpy.context.view_layer.update()
         assert bpy.ops.qc3d.rebake() == {'FINISHED'}
@@ -108,7 +108,7 @@ class TestBake:
         moved = again.shapes - first.shapes
         np.testing.assert_allclose(moved, np.broadcast_to([1.0, 0.0, 0.0], moved.shape), atol=1e-5)
         bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean")
-        assert Record.read(figure.data.shape_keys).chains[0].result["collider_crossings"] is None
+        assert Record.read(figure.data.shape_keys).chains[0].result.collider_crossings is None
 
     def test_the_panel_names_it_too(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
         figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.colliders = "Basis", "Lean", "Off"

@@ -213,7 +213,7 @@ class TestLaterFailures:
         baked.data.shape_keys.key_blocks["Basis→Lean 2/3"].lock_shape = True
         before = state()
         assert bake() == (
-            "Error: Shape key 'Basis→Lean 2/3' of an earlier bake is locked; unlock it to bake again."
+            "Error: Shape key 'Basis→Lean 2/3' of an earlier bake is locked; unlock it first."
         )
         assert state() == before
 
@@ -263,7 +263,7 @@ class TestLaterFailures:
             (shape_keys, "set_key_coordinates", 4),
             (slider, "drive", 1),
             (slider, "drive", 5),
-            (slider, "set_keyframes", 1),
+            (slider, "begin_keyframes", 1),
         ],
     )
     @pytest.mark.parametrize("to_key", ["Lean", "Stretch"])

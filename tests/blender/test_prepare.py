@@ -10,6 +10,7 @@ from typing import Any, get_args
 import bpy
 import pytest
 
+from qc3d_addon.blender.records import Record
 from qc3d_addon.solver.settings import Mode
 
 PAIR = {"from_key": "Basis", "to_key": "Lean"}
@@ -100,11 +101,16 @@ def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[An
     assert len(quick_map) == 2
 
 
-def test_a_damaged_map_is_refused_and_prepare_heals_it(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+def test_a_damaged_map_is_made_again_and_a_note_says_so(figure: bpy.types.Object, quick_map: list[Any]) -> None:
     bake()
     (name,) = map_properties()
-    figure.data.shape_keys[name] = map_properties()[name][:100]
-    with pytest.raises(RuntimeError, match="The stored map is damaged; prepare the keys again"):
-        bake(count=2)
-    bpy.ops.qc3d.prepare(**PAIR)
+    whole = map_properties()[name]
+    figure.data.shape_keys[name] = whole[:100]
     bake(count=2)
+    note = "The map that was kept from 'Basis' to 'Lean' is damaged and was made again."
+    assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert len(quick_map) == 2
+    assert len(map_properties()[name]) == len(whole)
+    bake(count=2)
+    assert note not in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert len(quick_map) == 2

@@ -36,7 +36,7 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
         copy = copied(obj, undo)
         copy.name = copy.data.name = f"{obj.name} absolute"
         heat_map.hide(copy)  # which is the original's
-        copy.shape_key_clear()
+        compat.clear_shape_keys(copy)
         for name in [name for name in copy.keys() if name.startswith("qc3d")]:  # noqa: SIM118 - not a dictionary
             del copy[name]
         if chain.slider in copy:
@@ -62,18 +62,19 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
 
 def copied(obj: bpy.types.Object, undo: ExitStack) -> bpy.types.Object:
     """A copy of a mesh object, with a mesh and keys of its own; closing ``undo`` removes it without a trace."""
-    blocks = [obj.copy()]
-    undo.callback(_remove, blocks)
-    blocks.append(obj.data.copy())
-    blocks[0].data = blocks[1]
-    return blocks[0]
+    copy = obj.copy()
+    undo.callback(_remove, copy, obj.data)
+    copy.data = obj.data.copy()
+    return copy
 
 
-def _remove(blocks: list[bpy.types.ID]) -> None:
-    """Remove an object and its mesh, and the actions that only they used."""
-    animated = [*blocks, *(block.shape_keys for block in blocks[1:] if block.shape_keys is not None)]
-    actions = {block.animation_data.action for block in animated if block.animation_data is not None} - {None}
-    bpy.data.batch_remove(blocks)
-    for action in actions:
+def _remove(copy: bpy.types.Object, original: bpy.types.Mesh) -> None:
+    """Remove an object with its mesh and keys, if they are not the original's, and the actions that only they used."""
+    mesh, keys = copy.data, copy.data.shape_keys
+    actions = {block.animation_data.action for block in (copy, keys) if block is not None and block.animation_data}
+    bpy.data.objects.remove(copy)
+    if mesh != original:
+        bpy.data.meshes.remove(mesh)
+    for action in actions - {None}:
         if action.users == 0:
             bpy.data.actions.remove(action)

@@ -48,6 +48,16 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     return curve
 
 
+def clear_shape_keys(obj: bpy.types.Object) -> None:
+    """Remove all shape keys of an object's mesh.
+
+    Up to 4.5 Blender leaves their data block behind, without a mesh: who then reads a point of it crashes.
+    """
+    number = obj.data.shape_keys.session_uid
+    obj.shape_key_clear()
+    bpy.data.batch_remove([keys for keys in bpy.data.shape_keys if keys.session_uid == number])
+
+
 def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
     """The F-curve that animates a property of ``owner`` in its active action, if there is one."""
     curves = _fcurves(owner)

@@ -92,7 +92,8 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
         undo.callback(setattr, modifier, "node_group", before)
         modifier.node_group = tree
         undo.pop_all()
-    _remove_unused(before)
+    if before is not None and before.users == 0:
+        bpy.data.node_groups.remove(before)
 
 
 def refresh(obj: bpy.types.Object, chain: Chain) -> None:
@@ -108,14 +109,14 @@ def refresh(obj: bpy.types.Object, chain: Chain) -> None:
 
 def hide(obj: bpy.types.Object) -> None:
     """Remove the heat map and everything that it added."""
-    before = _state(obj).get("active_colour", "")
-    modifier = _modifier(obj)
-    if modifier is not None:
-        tree = modifier.node_group
-        obj.modifiers.remove(modifier)
-        _remove_unused(tree)
+    before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
     _set_attributes(obj.data, None)
     _set_active_colour(obj.data, before)
+    if modifier is not None:  # last: for as long as it is there, the heat map is known and can be hidden
+        tree = modifier.node_group
+        obj.modifiers.remove(modifier)
+        if tree is not None and tree.users == 0:
+            bpy.data.node_groups.remove(tree)
     obj.pop(_STATE, None)
 
 
@@ -162,11 +163,6 @@ def _set_attributes(mesh: bpy.types.Mesh, values: dict[str, NDArray[np.float32]]
         attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
         attribute.data.foreach_set("value", np.ascontiguousarray(at_vertices))
     mesh.color_attributes.new(NAME, 'FLOAT_COLOR', 'POINT')
-
-
-def _remove_unused(tree: bpy.types.NodeTree | None) -> None:
-    if tree is not None and tree.users == 0:
-        bpy.data.node_groups.remove(tree)
 
 
 def _is_ours(name: str) -> bool:

@@ -64,26 +64,31 @@ def bake_to_keyframes(
     slider.require(owner, chain.slider)
     places = slider_values(context, owner, chain.slider, frames)
     owned = shape_keys.owned_keys(keys, chain)
-    values = {step: key_values(chain, step, places) for step in owned}
-    notes = []
+    notes, animated = [], []
     with ExitStack() as undo:
-        curves = {}
         for step, key in owned.items():
-            curves[step] = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
-            if len(curves[step].keyframe_points):
+            curve = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
+            if len(curve.keyframe_points):
                 notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
+            animated.append((key, curve, key_values(chain, step, places)))
         chain_memory.forget(keys, record, chain, undo)
         undo.pop_all()
-    # Nothing below can fail for a reason that was not checked before.
+    _put_in_place(animated, np.array(frames, dtype=np.float64))
     removal.hide_heat_map(obj, chain)
-    for step, key in owned.items():
-        slider.undrive(key)
-        _set_keyframes(curves[step], np.array(frames, dtype=np.float64), values[step])
-        key.value = float(values[step][0])
     notes += removal.remove_slider(owner, chain)
     keys.update_tag()
     context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
     return notes
+
+
+def _put_in_place(
+    animated: list[tuple[bpy.types.ShapeKey, bpy.types.FCurve, NDArray[np.float64]]], frames: NDArray[np.float64]
+) -> None:
+    """Let curves with these values at ``frames`` do what the drivers of keys did."""
+    for key, curve, values in animated:
+        slider.undrive(key)
+        _set_keyframes(curve, frames, values)
+        key.value = float(values[0])
 
 
 def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:

@@ -132,7 +132,7 @@ def state() -> Callable[[], dict[str, Any]]:
             "collections": [(group.name, group.objects.keys()) for group in bpy.data.collections],
             "frame": bpy.context.scene.frame_current_final,
             "selected": sorted(obj.name for obj in bpy.context.selected_objects),
-            "active": bpy.context.view_layer.objects.active,
+            "active": getattr(bpy.context.view_layer.objects.active, "name", None),
         }
 
     return describe

@@ -29,4 +29,4 @@ def _plain(value: object) -> object:
     for convert in ("to_dict", "to_list"):
         if hasattr(value, convert):
             return getattr(value, convert)()
-    return value
+    return [_plain(part) for part in value] if isinstance(value, list) else value

@@ -21,7 +21,7 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
     Raises
     ------
     InputError
-        If there is no such slider, or it is not a number at one of the frames.
+        If there is no such slider, or it is no number at one of the frames.
     """
     scene = context.scene
     current, part = scene.frame_current, scene.frame_subframe
@@ -32,8 +32,6 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
             evaluated = owner.evaluated_get(context.evaluated_depsgraph_get())
             slider.require(evaluated, name)
             values.append(float(evaluated[name]))
-            if np.isnan(values[-1]):
-                raise InputError(f"The slider '{name}' has no value at frame {frame}; mend what animates it first.")
     finally:
         scene.frame_set(current, subframe=part)
     return np.array(values)
@@ -41,7 +39,7 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
 
 def key_values(chain: Chain, step: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) values of the key at a step where the slider is at ``places`` (k,): what its driver gives."""
-    return np.maximum(0.0, 1.0 - np.abs(places * chain.intervals - step))
+    return np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
 
 
 def bake_to_keyframes(

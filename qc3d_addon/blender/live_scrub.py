@@ -10,7 +10,6 @@ after. Its name is reserved: a key of that name is taken away wherever it turns 
 from __future__ import annotations
 
 import contextlib
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -37,7 +36,7 @@ class _Scrub:
     plan: Plan  # finds the object, and knows the keys that the curve was made from
     chain: Chain
     curve: PreviewCurve
-    place: float | None = None  # where the slider was when the key was last set; None where it shows nothing
+    place: float | None = None  # where the slider was when the key was last set
     was_edited: bool = False
 
 
@@ -61,6 +60,7 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
     """
     obj = plan.find_object()
     slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
+    shape_keys.restart_drivers(obj.data.shape_keys, chain)
     end()
     _show(obj, _Scrub(plan, chain, curve))
 
@@ -99,10 +99,7 @@ def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
 
 
 def _follow(scrub: _Scrub) -> None:
-    """Set the key to where the slider is, or end where the object is gone, was edited, or has lost key or slider.
-
-    Where the slider is NaN, as a driver may make it, the drivers of the baked keys show nothing, and so does this.
-    """
+    """Set the key to where the slider is, or end where the object is gone, was edited, or has lost key or slider."""
     obj = scrub.plan.locate()
     keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
     key = None if keys is None else keys.key_blocks.get(KEY)
@@ -118,12 +115,11 @@ def _follow(scrub: _Scrub) -> None:
     if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or not is_playable:
         end()
         return
-    value = float(owner[scrub.chain.slider])
-    place = None if math.isnan(value) else value
+    place = float(owner[scrub.chain.slider])
     if place != scrub.place and not key.mute:
         scrub.place = place
-        beyond = 0.0 if place is None else scrub.curve.beyond_blend(place, scrub.chain.intervals)
-        set_key_coordinates(key, key_coordinates(obj, keys.reference_key.name) + beyond)
+        basis = key_coordinates(obj, keys.reference_key.name)
+        set_key_coordinates(key, basis + scrub.curve.beyond_blend(place, scrub.chain.intervals))
         keys.update_tag()
 
 

@@ -33,6 +33,7 @@ _MORE = (
     (QC3D_OT_save_map, 'FILE_TICK'),
     (QC3D_OT_remove, 'TRASH'),
 )
+_STOPPED = "Blender stopped the drivers, since the slider had no value for a moment; re-bake to start them again."
 _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
 
 
@@ -75,6 +76,8 @@ def _draw_chain(
         layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
     else:
         draw_sentence(context, layout, slider_problem, 'ERROR')
+    if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+        draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(obj.data.shape_keys, chain)
     buttons = layout.row(align=True)
     if problem is not None and chain.mirror_of:  # it has no keys of its own to be made from

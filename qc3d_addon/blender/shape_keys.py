@@ -59,6 +59,19 @@ def slider_owner(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
     return obj
 
 
+def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
+    """Whether Blender has stopped the chain's drivers, which it does for good where the slider was NaN once."""
+    driver = next(_drivers(keys, chain), None)
+    return driver is not None and not driver.is_valid
+
+
+def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
+    """Start drivers again that Blender has stopped."""
+    for driver in slider.driven_by(keys, chain.slider).values():
+        driver.is_valid = True
+    keys.update_tag()
+
+
 def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
     """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
     for name in chain.keys.values():

@@ -9,6 +9,7 @@ slider thus shows the first key from the moment of the bake on. What other keys 
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 
 import bpy
@@ -38,11 +39,14 @@ def problem(obj: bpy.types.Object, name: str) -> str | None:
     """Why the slider of that name cannot play anything, or None. Quick enough for a panel."""
     if name not in obj:
         return f"The slider '{name}' was deleted; re-bake it first."
-    if not isinstance(obj[name], (bool, int, float)):
+    value = obj[name]
+    if not isinstance(value, (bool, int, float)):
         return (
             f"The slider '{name}' of '{obj.name}' is not a number any more; delete that custom property, then re-bake "
             "to have it again."
         )
+    if math.isnan(value):
+        return f"The slider '{name}' of '{obj.name}' has no value (NaN); give it one, or mend what drives it."
     return None
 
 
@@ -99,7 +103,10 @@ def retarget(driver: bpy.types.Driver, obj: bpy.types.Object, undo: ExitStack) -
     """Let a driver read the slider of ``obj``; the object that it read before may have been deleted."""
     target = driver.variables[0].targets[0]
     undo.callback(setattr, target, "id", target.id)
+    undo.callback(setattr, target, "id_type", target.id_type)
+    target.id_type = 'OBJECT'
     target.id = obj
+    driver.is_valid = True  # Blender stops a driver for good where its variable was NaN once
 
 
 def value_path(key_name: str) -> str:

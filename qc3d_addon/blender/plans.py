@@ -196,7 +196,9 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
 
     with shape_keys.chain_written(obj, chain, shapes, intervals, request.keyframes) as (undo, said):
         owner = shape_keys.slider_owner(obj, chain).name
-        notes = [*plan.notes, *bake.report["notes"], *said, *thinned, *passed, *_values_that_add(keys, request)]
+        notes = [*plan.notes, *bake.report["notes"], *said, *thinned, *passed]
+        notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
+        notes += _values_that_add(keys, request)
         report = {
             "object": obj.name,
             "from": request.keys[0],

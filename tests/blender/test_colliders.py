@@ -14,7 +14,10 @@ import pytest
 from qc3d_addon.blender import plans
 from qc3d_addon.blender.colliders import read_colliders
 from qc3d_addon.blender.records import Record
+from qc3d_addon.blender.requests import BakeRequest
 from qc3d_addon.solver.colliders import Collider
+from qc3d_addon.solver.pipeline import finish
+from qc3d_addon.solver.task import carry_out
 
 THROUGH = ("Basis", "Lean")
 State = Callable[[], dict[str, Any]]
@@ -124,3 +127,38 @@ class TestBake:
         with pytest.raises(RuntimeError, match=sentence):
             bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders=name)
         assert state() == before
+
+
+class TestMeanwhile:
+    """What happens to the objects between the beginning of a bake and its end."""
+
+    SENTENCE = "The objects of 'Off' were changed meanwhile; re-bake to keep off where they are now."
+
+    def notes(self, figure: bpy.types.Object, change: Callable[[], object]) -> tuple[str, ...]:
+        plan = plans.plan_bake(figure, BakeRequest(THROUGH, 1, colliders="Off"))
+        outcome = finish(carry_out(plan.task))
+        change()
+        bpy.context.view_layer.update()
+        return plans.write_bake(plan, outcome).notes
+
+    @pytest.mark.usefixtures("quick_map")
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda: setattr(bpy.data.objects["Ball"], "location", (2.5, 0.0, 0.0)),
+            lambda: setattr(bpy.data.objects["Figure"], "location", (0.5, 0.0, 0.0)),
+            lambda: bpy.data.objects["Ball"].modifiers.new("Finer", 'SUBSURF'),
+            lambda: bpy.data.objects.remove(bpy.data.objects["Ball"]),
+            lambda: setattr(bpy.data.collections["Off"], "name", "Other"),
+        ],
+        ids=["moved", "seen from elsewhere", "finer", "deleted", "collection renamed"],
+    )
+    def test_a_change_is_said(
+        self, figure: bpy.types.Object, ball: bpy.types.Object, change: Callable[[], object]
+    ) -> None:
+        assert self.SENTENCE in self.notes(figure, change)
+        assert self.SENTENCE in Record.read(figure.data.shape_keys).chains[0].result.notes
+
+    @pytest.mark.usefixtures("quick_map")
+    def test_no_change(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+        assert self.SENTENCE not in self.notes(figure, lambda: setattr(ball, "name", "Globe"))

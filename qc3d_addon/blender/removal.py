@@ -65,11 +65,14 @@ def hide_heat_map(obj: bpy.types.Object, chain: Chain) -> None:
 
 
 def _drivers() -> Iterator[bpy.types.FCurve]:
-    """All drivers of the file."""
+    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
     for collection in bpy.data.bl_rna.properties:
         if collection.type != 'COLLECTION':
             continue
         for block in getattr(bpy.data, collection.identifier):
+            owner = block.user if isinstance(block, bpy.types.Key) else block
+            if owner is None or not owner.users:
+                continue
             animation = getattr(block, "animation_data", None)
             if animation is not None:
                 yield from animation.drivers

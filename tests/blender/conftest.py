@@ -46,14 +46,18 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
 
     def fill_cube(points: np.ndarray, faces: np.ndarray, settings: Settings) -> FilledCube:
         calls.append(settings)
-        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
-        # Kuhn's six: one for each way round from corner 0 to corner 7 along three edges.
-        tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
-        return FilledCube(TetMesh(corners, tets), "six", ())
+        return six_tetrahedra()
 
     monkeypatch.setattr(preparation, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
+
+
+def six_tetrahedra() -> FilledCube:
+    """The unit cube of six tetrahedra: one for each way round from corner 0 to corner 7 along three edges (Kuhn)."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
+    tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
+    return FilledCube(TetMesh(corners, tets), "six", ())
 
 
 @pytest.fixture

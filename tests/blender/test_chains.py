@@ -97,6 +97,14 @@ class TestRemove:
         assert SLIDER in figure
         lamp.driver_remove("location", 0)
 
+    def test_a_driver_of_what_was_deleted_is_no_reason_to_stay(self, figure: bpy.types.Object) -> None:
+        bake()
+        bpy.ops.qc3d.absolute_keys()
+        bpy.data.objects.remove(bpy.data.objects["Figure absolute"])  # its mesh, its keys and their driver are there
+        assert len(bpy.data.shape_keys) == 2
+        assert bpy.ops.qc3d.remove() == {"FINISHED"}
+        assert SLIDER not in figure
+
     def test_the_animators_own_keyframes_stay(self, figure: bpy.types.Object) -> None:
         bake()
         figure.keyframe_insert(f'["{SLIDER}"]', frame=7)

@@ -34,6 +34,12 @@ def unregister_command(handle: object) -> None:
     bpy.utils.unregister_cli_command(handle)
 
 
+def remove_handler(handlers: list[Callable[..., object]], handler: Callable[..., object]) -> None:
+    """Take a handler back, where it is still there: some scripts and add-ons remove those of others with their own."""
+    if handler in handlers:
+        handlers.remove(handler)
+
+
 def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     """Add a driver whose value reaches the property unchanged.
 

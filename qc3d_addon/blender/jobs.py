@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.app.handlers import persistent
 
+from . import compat
+
 if TYPE_CHECKING:
     from ..solver.pipeline import Progress
     from ..solver.task import Outcome, Task
@@ -175,5 +177,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop the job."""
-    bpy.app.handlers.load_pre.remove(_on_load)
+    compat.remove_handler(bpy.app.handlers.load_pre, _on_load)
     cancel()

@@ -18,7 +18,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
-from . import shape_keys, slider
+from . import compat, shape_keys, slider
 from .mesh_data import key_coordinates, set_key_coordinates
 from .records import Chain, Record
 
@@ -219,5 +219,5 @@ def register() -> None:
 def unregister() -> None:
     """Take the preview away and follow nothing."""
     for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+        compat.remove_handler(getattr(bpy.app.handlers, name), handler)
     end()

@@ -68,6 +68,15 @@ def sculpt_mode(figure: bpy.types.Object, folder: Path) -> str:
     return "'Figure' is being edited; go back to Object Mode first."
 
 
+def sculpted_through_another_object(figure: bpy.types.Object, folder: Path) -> str:
+    twin = bpy.data.objects.new("Twin", figure.data)
+    bpy.context.scene.collection.objects.link(twin)
+    bpy.context.view_layer.objects.active = twin
+    bpy.ops.object.mode_set(mode='SCULPT')
+    bpy.context.view_layer.objects.active = figure
+    return "'Twin', which shares its mesh, is being edited; go back to Object Mode first."
+
+
 def absolute_keys(figure: bpy.types.Object, folder: Path) -> str:
     figure.data.shape_keys.use_relative = False
     return "The shape keys of 'Figure' are absolute; switch on Relative, which the slider needs."
@@ -113,6 +122,7 @@ def link_from_library(folder: Path) -> bpy.types.Object:
         one_key,
         edit_mode,
         sculpt_mode,
+        sculpted_through_another_object,
         absolute_keys,
         linked_object,
         linked_mesh,

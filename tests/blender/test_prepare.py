@@ -11,6 +11,7 @@ import bpy
 import pytest
 
 from qc3d_addon.blender.records import Record
+from qc3d_addon.solver import storage
 from qc3d_addon.solver.settings import Mode
 
 PAIR = {"from_key": "Basis", "to_key": "Lean"}
@@ -99,6 +100,34 @@ def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[An
     bpy.ops.qc3d.prepare(**PAIR)
     bpy.ops.qc3d.prepare(**PAIR)
     assert len(quick_map) == 2
+
+
+@pytest.mark.parametrize(("version", "which"), [(0, "an earlier"), (2, "a later")])
+def test_a_map_of_another_version_is_made_again_and_a_note_says_so(
+    figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, version: int, which: str
+) -> None:
+    monkeypatch.setattr(storage, "FORMAT_VERSION", version)
+    assert bpy.ops.qc3d.prepare(**PAIR) == {'FINISHED'}
+    monkeypatch.undo()
+    bake()
+    note = f"The map that was kept from 'Basis' to 'Lean' was stored by {which} version of QC3D and was made again."
+    assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
+    (data,) = map_properties().values()
+    assert storage.why_unusable(bytes(data)) is None
+    before = map_properties()
+    bake(count=2)
+    assert note not in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert map_properties() == before
+
+
+def test_a_map_of_another_version_is_not_saved_as_a_file(
+    figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bake()
+    monkeypatch.setattr(storage, "FORMAT_VERSION", 2)
+    with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
+        bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_map_is_made_again_and_a_note_says_so(figure: bpy.types.Object, quick_map: list[Any]) -> None:

@@ -89,11 +89,23 @@ class TestSettings:
             ({"mesh_time_limit": 0.0}, "The time limit of meshing is 0.0 s; it must be positive."),
             ({"mesh_time_limit": float("nan")}, "The time limit of meshing is nan s"),
             ({"seed": -1}, "The seed is -1; it must be 0 or more."),
+            ({"seed": "2"}, "The seed is '2'; it must be a whole number."),
+            ({"seed": True}, "The seed is True; it must be a whole number."),
+            ({"extra_turns": 1.5}, "The number of extra turns is 1.5; it must be a whole number."),
+            ({"extra_turns": "2"}, "The number of extra turns is '2'; it must be a whole number."),
+            ({"extra_turns": None}, "The number of extra turns is None; it must be a whole number."),
+            ({"mesh_time_limit": "60"}, "The time limit of meshing is '60'; it must be a number of seconds."),
+            ({"mode": ["natural"]}, "Unknown mode ['natural']; choose one of "),
         ],
     )
     def test_refused_with_a_sentence(self, choice: dict[str, Any], sentence: str) -> None:
         with pytest.raises(InputError, match=re.escape(sentence)):
             Settings(**choice)
+
+    def test_whole_numbers_of_numpy_are_taken(self) -> None:
+        found = Settings(seed=np.int64(3), extra_turns=np.int8(-1))  # type: ignore[arg-type]
+        assert found == Settings(seed=3, extra_turns=-1)
+        assert (type(found.seed), type(found.extra_turns)) == (int, int)
 
     def test_the_paper_is_selectable(self) -> None:
         assert Settings(mode="linear").mode == "linear"

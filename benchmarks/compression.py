@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.experiments import shapes
-from qc3d_addon.solver import frame_compression
-from qc3d_addon.solver.compressed_files import Packer, Source
-from qc3d_addon.solver.compression import Codec, Scheme
+from qc3d_addon.solver.compression import frames as frame_compression
+from qc3d_addon.solver.compression.codec import Codec, Scheme
+from qc3d_addon.solver.compression.files import Packer, Source
+from qc3d_addon.solver.compression.search import Choice, Compressor
 from qc3d_addon.solver.errors import InputError, ReconstructionError
-from qc3d_addon.solver.rate import Choice, Compressor
+from qc3d_paper.experiments import shapes
 
 ERRORS = (1e-2, 3e-3, 1e-3, 1e-4)
 MODES = 300
@@ -36,8 +36,8 @@ def main() -> None:
     print("| what | error | modes | remainder | bytes | of raw | quantised + deflate | ratio | folds | theirs |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for pose in (shapes.DATA_FACES[1], shapes.DATA_BODIES[2]):
-        prepared = shapes.fitted(shapes.read(pose, arguments.data))
-        mesh, targets = prepared.mesh, prepared.mapped[None]
+        fitted = shapes.fitted(shapes.read(pose, arguments.data))
+        mesh, targets = fitted.mesh, fitted.mapped[None]
         packer = Packer(Source("maps", mesh.points, mesh.tets), MODES)
         compressor = Compressor(Codec(mesh, MODES), targets, packer)
         _print_errors(pose.label, compressor)

@@ -17,9 +17,9 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from qc3d_addon.solver.factorization import dissection_order
-from qc3d_addon.solver.stiffness import StiffnessPattern, stiffness_elements
-from qc3d_addon.solver.surface import hat_gradients, tangent_bases
+from qc3d_addon.solver.numerics.assembly import StiffnessPattern, stiffness_elements
+from qc3d_addon.solver.numerics.nested_dissection import dissection_order
+from qc3d_addon.solver.triangles.geometry import hat_gradients, tangent_bases
 
 from .catalogue import Floats, Ints
 from .report import table

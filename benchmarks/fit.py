@@ -16,16 +16,16 @@ from unittest.mock import patch
 import numpy as np
 from scipy.sparse.linalg import cg
 
-from qc3d_addon.solver import foldfree
-from qc3d_addon.solver.continuation import follow_path, path_to
-from qc3d_addon.solver.delaunay import delaunay_mesh
-from qc3d_addon.solver.embedding import Embedding
-from qc3d_addon.solver.foldfree import FoldFreeFitter
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.location import interpolation_matrix
-from qc3d_addon.solver.progress import finish
-from qc3d_addon.solver.sampling import Resolution
-from qc3d_addon.solver.surface_path import SurfacePath
+from qc3d_addon.solver.fit import fold_free
+from qc3d_addon.solver.fit.continuation import follow_path, path_to
+from qc3d_addon.solver.fit.fold_free import FoldFreeFitter
+from qc3d_addon.solver.keys.embedding import Embedding
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.meshing.delaunay import delaunay_mesh
+from qc3d_addon.solver.meshing.poisson_disk import Resolution
+from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.solver.surface.path import SurfacePath
+from qc3d_addon.solver.tets.point_location import interpolation_matrix
 
 from . import stage_cases
 from .report import table
@@ -46,7 +46,7 @@ def main() -> None:
             mesh = delaunay_mesh(embedding.key0, faces, Resolution(spacing, 0.25, 5.0 * spacing), 0)
             landmarks = interpolation_matrix(mesh, embedding.key0)
             products: list[int] = []
-            with patch.object(foldfree, "cg", _counting(cg, products)):
+            with patch.object(fold_free, "cg", _counting(cg, products)):
                 started = clock.perf_counter()
                 fitter = FoldFreeFitter(mesh, landmarks, embedding.weights)
                 values = finish(follow_path(fitter, targets)).maps[-1]

@@ -20,12 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import Progress, evenly_spaced
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.task import Task
-from qc3d_addon.solver.topology import sides
+from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.keys.files import read_pair
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import Progress
+from qc3d_addon.solver.triangles.topology import sides
 from qc3d_addon.worker import client
 
 from .catalogue import DATA
@@ -43,19 +44,19 @@ def main() -> None:
     parser.add_argument("--quality", default="normal")
     parser.add_argument("--frames", type=int, default=5, help="in-betweens (default: 5)")
     chosen = parser.parse_args()
-    settings = Settings(engine=chosen.engine, quality=chosen.quality)
+    options = FitOptions(engine=chosen.engine, quality=chosen.quality)
     print("| vertices | engine | s | MB | seconds by stage |")
     print("|---|---|---|---|---|")
     for wanted in chosen.vertices:
-        pair = divided(read_pairs(DATA / "body.npz", KEYS)[0], wanted)
-        task = Task({KEYS: pair}, KEYS, settings, evenly_spaced(chosen.frames))
+        pair = divided(read_pair(DATA / "body.npz", *KEYS), wanted)
+        task = Task({KEYS: pair}, KEYS, options, times=evenly_spaced(chosen.frames))
         started = clock.perf_counter()
         with PeakMemory() as peak:
             bake = client.run(task, peak.note).bake
         assert bake is not None
-        stages = ", ".join(f"{name} {seconds:.0f}" for name, seconds in bake.report["seconds"].items())
+        stages = ", ".join(f"{name} {seconds:.0f}" for name, seconds in bake.report.seconds.items())
         taken = clock.perf_counter() - started
-        print(f"| {len(pair.key0)} | {bake.report['engine']} | {taken:.0f} | {peak.megabytes:.0f} | {stages} |")
+        print(f"| {len(pair.key0)} | {bake.report.engine} | {taken:.0f} | {peak.megabytes:.0f} | {stages} |")
         print(f"  by stage: {peak.stages}", file=sys.stderr, flush=True)
 
 

@@ -12,12 +12,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from qc3d_addon.blender.bake import bake_object
-from qc3d_addon.blender.mesh_data import key_coordinates, triangles
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.crossings import crossing_pairs
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import Floats
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+from qc3d_addon.solver.arrays import Floats
+from qc3d_addon.solver.collision.crossings import crossing_pairs
 
 FILE = Path(__file__).resolve().parents[1] / "assets" / "lid.blend"
 COUNT = 24
@@ -32,7 +31,7 @@ def main() -> None:
     for name, colliders in (("without colliders", ""), ("with colliders", "Eyeball")):
         bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
         lid = bpy.data.objects["Lid"]
-        request = BakeRequest(("Basis", "Closed"), COUNT, Settings(engine="delaunay"), colliders=colliders)
+        request = BakeRequest(("Basis", "Closed"), COUNT, colliders=colliders)
         result = bake_object(lid, request)
         frames = [key_coordinates(lid, key).astype(np.float64) for key in ("Basis", *result.keys)]
         if not colliders:

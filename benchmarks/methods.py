@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qc3d_addon.solver import pipeline
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.prepared import PreparedMap
-from qc3d_addon.solver.settings import Mode, Settings
+from qc3d_addon.solver.api import Fit
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.settings import FitOptions, Mode
+from qc3d_addon.solver.support.progress import finish
 
 from .classical import arap, poisson
 
@@ -41,7 +42,7 @@ class Contest:
     def __init__(self, faces: Ints, key0: Floats, key1: Floats, times: Floats, choices: dict[str, Any]) -> None:
         self.faces, self.key0, self.key1, self.times = faces, key0, key1, times
         self._choices = choices
-        self._prepared: PreparedMap | None = None
+        self._fitted: Fit | None = None
 
     def run(self, method: str) -> Outcome:
         """The in-betweens of one method."""
@@ -63,9 +64,8 @@ class Contest:
         return Outcome(frames, clock.perf_counter() - started, details)
 
     def _ours(self, mode: Mode) -> Outcome:
-        settings = Settings(**self._choices, mode=mode)
-        if self._prepared is None:
+        if self._fitted is None:
             pair = KeyPair.checked(self.key0, self.key1, self.faces)
-            self._prepared = pipeline.finish(pipeline.prepare(pair, settings))
-        bake = pipeline.finish(pipeline.inbetweens(self._prepared, self.times, settings))
-        return Outcome(bake.frames, sum(bake.report["seconds"].values()), {"report": bake.report})
+            self._fitted = Fit(finish(fit_pair(pair, FitOptions(**self._choices))))
+        bake = self._fitted.inbetweens(self.times, mode=mode)
+        return Outcome(bake.frames, sum(bake.report.seconds.values()), {"report": bake.report.as_json()})

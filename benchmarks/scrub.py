@@ -17,13 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
-from qc3d_addon.solver.preview import PreviewCurve
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.storage import to_bytes
-from qc3d_addon.solver.task import Task
+from qc3d_addon.solver.api import Fit
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.fit.storage import to_bytes
+from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.preview import PreviewCurve
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.keys.files import read_pair
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.worker import client
 
 from .catalogue import DATA
@@ -39,18 +42,17 @@ _UPDATES = 60
 def main(arguments: list[str]) -> None:
     """Print the table."""
     folder = Path(arguments[0]) if arguments else DATA
-    settings = Settings(engine="delaunay")
     columns = ("pair", "vertices", "steps", "largest error / diagonal", "s until it shows", "processor s", "MB")
     print(f"| {' | '.join((*columns, 'ms an evaluation', 'ms a step'))} |")
     print("|---|---|---|---|---|---|---|---|---|")
     for file, first, second in PAIRS:
-        pair = read_pairs(folder / f"{file}.npz", (first, second))[0]
-        prepared = finish(prepare(pair, settings))
-        known = finish(inbetweens(prepared, _BETWEEN, settings)).frames
+        pair = read_pair(folder / f"{file}.npz", first, second)
+        fitted = finish(fit_pair(pair, FitOptions()))
+        known = Fit(fitted).inbetweens(_BETWEEN).frames
         ends = (first, second)
         for steps in STEPS:
             started, used = clock.perf_counter(), _processor_seconds()
-            task = Task({ends: pair}, ends, settings, evenly_spaced(steps - 1), {ends: to_bytes(prepared)})
+            task = Task({ends: pair}, ends, times=evenly_spaced(steps - 1), kept={ends: to_bytes(fitted)})
             bake = client.run(task, None).bake
             assert bake is not None
             curve = PreviewCurve(bake.frames)
@@ -80,7 +82,7 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     """Seconds from a place of the slider to the mesh that is drawn."""
     import bpy
 
-    from qc3d_addon.blender.mesh_data import key_coordinates, set_key_coordinates
+    from qc3d_addon.blender.store.mesh_data import key_coordinates, set_key_coordinates
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("Mesh")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.figures.sheets import Row, save_sheet
+from qc3d_paper.drawing.sheets import Row, save_sheet
 
 from .catalogue import Pair
 from .report import ORDER

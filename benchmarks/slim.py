@@ -18,18 +18,18 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from qc3d_addon.solver.continuation import follow_path, path_to
-from qc3d_addon.solver.embedding import Embedding
-from qc3d_addon.solver.foldfree import FoldFreeFitter
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.location import interpolation_matrix
-from qc3d_addon.solver.meshing import fill_cube
-from qc3d_addon.solver.progress import finish
-from qc3d_addon.solver.rotations import determinants
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.stiffness import StiffnessPattern, stiffness_elements
-from qc3d_addon.solver.surface_path import SurfacePath
-from qc3d_addon.solver.tetmesh import Floats
+from qc3d_addon.solver.arrays import Floats
+from qc3d_addon.solver.fit.continuation import follow_path, path_to
+from qc3d_addon.solver.fit.fold_free import FoldFreeFitter
+from qc3d_addon.solver.keys.embedding import Embedding
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.meshing.cube import fill_cube
+from qc3d_addon.solver.numerics.assembly import StiffnessPattern, stiffness_elements
+from qc3d_addon.solver.numerics.rotations import determinants
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.solver.surface.path import SurfacePath
+from qc3d_addon.solver.tets.point_location import interpolation_matrix
 
 from .report import table
 from .stage_cases import load
@@ -49,7 +49,7 @@ class Problem:
     def __init__(self, case: str) -> None:
         faces, key0, key1 = load(case)
         self.embedding = Embedding.of(KeyPair.checked(key0, key1, faces))
-        self.mesh = fill_cube(self.embedding.key0, faces, Settings(engine="delaunay", quality="finest")).mesh
+        self.mesh = fill_cube(self.embedding.key0, faces, FitOptions(quality="finest")).mesh
         self.landmarks = interpolation_matrix(self.mesh, self.embedding.key0)
         self.targets = path_to(SurfacePath(self.embedding), self.embedding.key1)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from qc3d_addon.solver.surface import face_normals
+from qc3d_addon.solver.triangles.geometry import face_normals
 
 from .catalogue import Floats, Ints, Pair
 

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import SuperLU
 
-    from qc3d_addon.solver.prepared import PreparedMap
+    from qc3d_addon.solver.fit.fitted_map import FittedMap
+    from qc3d_addon.solver.settings import Engine
 
 _REPEATS = 15
 
@@ -42,39 +43,43 @@ def main(arguments: list[str]) -> None:
     if engine == "yardstick":
         found = yardstick(case)
     else:
-        found = stages(case, engine, int(arguments[2]), arguments[3:] == ["one"])
+        found = stages(case, "tetwild" if engine == "tetwild" else "delaunay",
+             int(arguments[2]), arguments[3:] == ["one"])
     usage = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
     found |= {"peak_mb": usage[0].ru_maxrss / 1024.0, "peak_child_mb": usage[1].ru_maxrss / 1024.0}
     found |= {"cpu": sum(part.ru_utime + part.ru_stime for part in usage)}
     json.dump(found, sys.stdout)
 
 
-def stages(case: str, engine: str, count: int, one: bool) -> dict[str, Any]:
+def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
     """Seconds of each stage of a cold bake and of a warm one; if so wished, of one frame and its floor."""
     started = clock.perf_counter()
-    from qc3d_addon.solver.keypair import KeyPair
-    from qc3d_addon.solver.pipeline import evenly_spaced, finish, inbetweens, prepare
-    from qc3d_addon.solver.settings import Settings
+    from qc3d_addon.solver.api import Fit
+    from qc3d_addon.solver.fit.fit_pair import fit_pair
+    from qc3d_addon.solver.frames.bake import evenly_spaced
+    from qc3d_addon.solver.keys.keypair import KeyPair
+    from qc3d_addon.solver.settings import FitOptions
+    from qc3d_addon.solver.support.progress import finish
 
     imported = clock.perf_counter() - started
     faces, key0, key1 = stage_cases.load(case)
-    settings = Settings(engine=engine)  # type: ignore[arg-type]
+    options = FitOptions(engine=engine)
     started = clock.perf_counter()
     pair = KeyPair.checked(key0, key1, faces)
-    prepared = finish(prepare(pair, settings))
-    bake = finish(inbetweens(prepared, evenly_spaced(count), settings))
+    fitted = finish(fit_pair(pair, options))
+    bake = Fit(fitted).inbetweens(evenly_spaced(count))
     cold = clock.perf_counter() - started
-    seconds: dict[str, float] = dict(bake.report["seconds"])
-    warm = _fastest(lambda: finish(inbetweens(prepared, evenly_spaced(count), settings)), 2)
+    seconds: dict[str, float] = dict(bake.report.seconds)
+    warm = _fastest(lambda: Fit(fitted).inbetweens(evenly_spaced(count)), 2)
     found = {
         "vertices": len(key0),
-        "tetrahedra": len(prepared.mesh.tets),
-        "folds": int(max(frame["folds"] for frame in bake.report["certificates"])),
+        "tetrahedra": len(fitted.mesh.tets),
+        "folds": int(max(one.folds for one in bake.report.certificates)),
         "import": imported,
         "cold": cold,
         "warm": warm,
         **{f"stage_{name}": value for name, value in seconds.items()},
-        **(_one_frame(prepared) if one else {}),
+        **(_one_frame(fitted) if one else {}),
         "count": count,
     }
     with suppress(ImportError):  # without Blender's module there is nothing to write to
@@ -82,11 +87,12 @@ def stages(case: str, engine: str, count: int, one: bool) -> dict[str, Any]:
     return found
 
 
-def _one_frame(prepared: PreparedMap) -> dict[str, float]:
+def _one_frame(fitted: FittedMap) -> dict[str, float]:
     """Seconds of one frame, of the back-substitutions in it, and of the same ones by themselves, over and over."""
-    from qc3d_addon.solver import moving_surface, volume_path
-    from qc3d_addon.solver.factorization import factored
-    from qc3d_addon.solver.natural import NaturalFrames
+    from qc3d_addon.solver.frames import volume_path
+    from qc3d_addon.solver.frames.natural import NaturalFrames
+    from qc3d_addon.solver.numerics.nested_dissection import factored
+    from qc3d_addon.solver.surface import system
 
     watches: list[_Stopwatch] = []
 
@@ -94,8 +100,8 @@ def _one_frame(prepared: PreparedMap) -> dict[str, float]:
         watches.append(_Stopwatch(factored(matrix)))
         return watches[-1]
 
-    with patch.object(volume_path, "factored", watched), patch.object(moving_surface, "factored", watched):
-        maker = NaturalFrames(replace(prepared, paths={}))
+    with patch.object(volume_path, "factored", watched), patch.object(system, "factored", watched):
+        maker = NaturalFrames(replace(fitted, path=None))
     middle = np.array([0.4])
     list(maker.frames(middle))  # what is made on first use
     runs = []

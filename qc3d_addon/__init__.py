@@ -2,10 +2,54 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QC3D fills in the frames between two shape keys with fold-free volumetric maps.
 
-This module is Blender's way in; it can be imported without Blender, where nothing needs to be registered.
+Blender's way in is ``register``; scripts find the public functions here, see docs/reference/python.md. They are loaded
+when they are first asked for, so that Blender, which imports this at its start, does not wait for scipy.
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .solver.api import (
+        Collider,
+        Fit,
+        FitOptions,
+        FrameOptions,
+        InputError,
+        QC3DError,
+        bake,
+        fit,
+        load_fit,
+        steps,
+    )
+
+__all__ = [
+    "Collider",
+    "Fit",
+    "FitOptions",
+    "FrameOptions",
+    "InputError",
+    "QC3DError",
+    "bake",
+    "fit",
+    "load_fit",
+    "register",
+    "steps",
+    "unregister",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .solver import api
+
+    return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
 
 def register() -> None:

@@ -10,11 +10,11 @@ import sys
 
 
 def main() -> int:
-    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main`. A request to end is treated as Ctrl-C is."""
+    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main.main`. A request to end is treated as Ctrl-C is."""
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         one_thread_each()
-        from .cli import main as run  # loading the libraries takes a while, in which Ctrl-C may come
+        from .cli.main import main as run  # loading the libraries takes a while, in which Ctrl-C may come
     except KeyboardInterrupt:
         print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
         return 130

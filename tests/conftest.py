@@ -7,7 +7,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import bpy
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -63,6 +62,8 @@ def bar_file(bar: dict[str, np.ndarray], tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def bar_scene(bar: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A .blend with the bar as the object "Bar", shape keys Basis and Bent, and "Plain", which has no shape keys."""
+    import bpy  # only here: tests of the solver run without Blender
+
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("Bar")
     mesh.from_pydata(bar["V0"].tolist(), [], bar["faces"].tolist())

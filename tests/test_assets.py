@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks.lid import crossings
-from qc3d_addon.blender.mesh_data import key_coordinates, triangles
+from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
 
 FILES = {
     "limb": ("Arm", ["Basis", "Bend 90", "Twist 120", "Bend and twist"]),
@@ -67,12 +67,12 @@ def test_it_is_small(name: str, repository: Path) -> None:
 def test_a_straight_blend_of_the_lid_goes_through_the_eyeball_and_ours_does_not(
     repository: Path, tmp_path: Path
 ) -> None:
-    from qc3d_addon import cli
+    from qc3d_addon.cli import main
 
     file, report = repository / "assets" / "lid.blend", tmp_path / "report.json"
     keys = ["--object", "Lid", "--from", "Basis", "--to", "Closed", "--frames", "7"]
     files = ["--output", str(tmp_path / "lid.blend"), "--report", str(report)]
-    assert cli.main(["bake", str(file), *keys, "--engine", "delaunay", "--colliders", "Eyeball", *files]) == 0
+    assert main.main(["bake", str(file), *keys, "--engine", "delaunay", "--colliders", "Eyeball", *files]) == 0
     _, positions, _ = shapes(tmp_path / "lid.blend", "Lid")
     lid = bpy.data.objects["Lid"]
     straight = crossings(lid, [(1.0 - t) * positions[0] + t * positions[1] for t in np.linspace(0.0, 1.0, 9)])

@@ -1,68 +1,180 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays go down, frames come up: the solver and its worker know nothing of Blender, and nothing of the layer above."""
+"""Arrays go down, frames come up: packages import from lower floors only, no two modules import each other in a circle,
+and nothing below the Blender layer knows of Blender."""
 
 from __future__ import annotations
 
 import ast
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+# From the ground up; a package may import from those on lower floors, and what is in it from itself.
+SOLVER_FLOORS = (
+    ("arrays", "errors"),
+    ("settings", "files"),
+    ("numerics", "support"),
+    ("triangles", "tets"),
+    ("keys", "meshing"),
+    ("surface", "collision", "maps"),
+    ("fit", "compression"),
+    ("frames",),
+    ("steps",),
+    ("api",),
+)
+ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))
+BLENDER_FLOORS = (
+    ("compat", "preferences"),
+    ("store",),
+    ("keys",),
+    ("heat_map",),
+    ("bake",),
+    ("chains", "live_scrub", "properties"),
+    ("operators",),
+    ("ui",),
+    ("cli",),
+    ("registration",),
+)
+HOUSES = {"qc3d_addon": ADDON_FLOORS, "qc3d_addon.solver": SOLVER_FLOORS, "qc3d_addon.blender": BLENDER_FLOORS}
+# Upward on purpose, and only when it is called: Blender runs the command as "blender --command qc3d".
+LATE = {("blender", "cli")}
+BELOW_BLENDER = ("qc3d_addon.solver", "qc3d_addon.worker")
 BLENDER_MODULES = {"bpy", "bpy_extras", "bmesh", "mathutils", "gpu", "blf", "addon_utils", "bl_ui", "bl_operators"}
-HEAVY_MODULES = {"pyvista", "torch"}
-MAY_IMPORT = {"solver": {"solver"}, "worker": {"solver", "worker"}}
+HEAVY_MODULES = {"pyvista", "torch", "matplotlib", "qc3d_paper"}
+MOST_MODULES = 8
+PACKAGE = "qc3d_addon"
 
 
-def forbidden_imports(source: str, package: str, depth: int = 1) -> list[str]:
-    """What a module of ``package`` imports and may not; ``depth`` is 1 for a module directly in the package."""
-    found = []
+def imports_of(source: str, module: str, is_package: bool = False) -> Iterator[str]:
+    """Absolute names of everything that a module imports, at its top or later."""
+    parts = module.split(".") if is_package else module.split(".")[:-1]
     for node in ast.walk(ast.parse(source)):
-        names: list[str] = []
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
-            names = [node.module or ""]
-        elif isinstance(node, ast.ImportFrom) and node.level > depth:
-            inside = [node.module] if node.module else [alias.name for alias in node.names]
-            found += ["." * node.level + name for name in inside if name.split(".")[0] not in MAY_IMPORT[package]]
-        banned = BLENDER_MODULES | HEAVY_MODULES | {"qc3d_addon"}
-        found += [name for name in names if name.split(".")[0] in banned]
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = parts[: len(parts) - node.level + 1] if node.level else []
+            target = [*base, *(node.module.split(".") if node.module else [])]
+            yield from (".".join([*target, alias.name]) for alias in node.names)
+
+
+def floor_of(floors: tuple[tuple[str, ...], ...], room: str) -> int:
+    """The number of the floor that a room is on; ValueError where it is on none."""
+    for number, rooms in enumerate(floors):
+        if room in rooms:
+            return number
+    raise ValueError(f"{room} is on no floor; add it to the list")
+
+
+def upward_imports(source: str, module: str, is_package: bool = False) -> list[str]:
+    """What a module imports from a room on its own or a higher floor, and what no layer below Blender's may import."""
+    found = []
+    for name in imports_of(source, module, is_package):
+        if module.startswith(BELOW_BLENDER) and name.split(".")[0] in BLENDER_MODULES | HEAVY_MODULES:
+            found.append(name)
+        for house, floors in HOUSES.items():
+            own, other = _room(module, house), _room(name, house)
+            if None in (own, other) or own == other or (own, other) in LATE:
+                continue
+            if floor_of(floors, own) <= floor_of(floors, other):
+                found.append(name)
     return found
 
 
+def _room(name: str, house: str) -> str | None:
+    """The package or module directly in ``house`` that a dotted name lies in."""
+    inside = name.removeprefix(f"{house}.")
+    return None if inside == name else inside.split(".")[0]
+
+
+def modules(repository: Path) -> Iterator[tuple[str, bool, str]]:
+    """Name, whether it is a package's own file, and source of every module of the add-on."""
+    for path in sorted((repository / PACKAGE).rglob("*.py")):
+        is_package = path.name == "__init__.py"
+        parts = path.relative_to(repository).with_suffix("").parts
+        yield ".".join(parts[:-1] if is_package else parts), is_package, path.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
-    ("source", "package"),
+    ("source", "module"),
     [
-        ("import bpy", "solver"),
-        ("def late():\n    from mathutils import Vector", "solver"),
-        ("from ..blender import bake", "solver"),
-        ("from .. import worker", "solver"),
-        ("from ..blender.bake import run", "worker"),
-        ("import qc3d_addon.blender", "solver"),
-        ("import torch", "worker"),
+        ("import bpy", "qc3d_addon.solver.maps.mapping"),
+        ("def late():\n    from mathutils import Vector", "qc3d_addon.solver.maps.mapping"),
+        ("from ...blender import bake", "qc3d_addon.solver.maps.mapping"),
+        ("from ...worker import client", "qc3d_addon.solver.frames.task"),
+        ("from ..fit import storage", "qc3d_addon.solver.maps.mapping"),
+        ("from ..maps.mapping import Mapping", "qc3d_addon.solver.surface.path"),
+        ("from ..blender.bake import run", "qc3d_addon.worker.client"),
+        ("import qc3d_addon.blender", "qc3d_addon.solver.errors"),
+        ("from ..ui import panels", "qc3d_addon.blender.bake.plan"),
+        ("import torch", "qc3d_addon.worker.client"),
     ],
 )
-def test_a_forbidden_import_is_found(source: str, package: str) -> None:
-    assert len(forbidden_imports(source, package)) == 1
+def test_an_upward_import_is_found(source: str, module: str) -> None:
+    assert len(upward_imports(source, module)) == 1
 
 
-@pytest.mark.parametrize("source", ["import numpy", "from .errors import InputError", "from ..solver import pipeline"])
-def test_an_allowed_import_is_not(source: str) -> None:
-    assert forbidden_imports(source, "worker") == []
+@pytest.mark.parametrize(
+    ("source", "module"),
+    [
+        ("import numpy", "qc3d_addon.worker.client"),
+        ("from ..solver.errors import InputError", "qc3d_addon.worker.client"),
+        ("from .representation import conductivity", "qc3d_addon.solver.maps.mapping"),
+        ("from ..store import names", "qc3d_addon.blender.keys.slider"),
+    ],
+)
+def test_a_downward_import_is_not(source: str, module: str) -> None:
+    assert upward_imports(source, module) == []
 
 
-@pytest.mark.parametrize("package", MAY_IMPORT)
-def test_lower_layers_import_nothing_from_above(repository: Path, package: str) -> None:
-    folder = repository / "qc3d_addon" / package
+def test_no_module_imports_upward(repository: Path) -> None:
     found = {
-        str(path.relative_to(repository)): names
-        for path in folder.rglob("*.py")
-        if (names := forbidden_imports(path.read_text(), package, len(path.relative_to(folder).parts)))
+        name: upward
+        for name, is_package, source in modules(repository)
+        if (upward := upward_imports(source, name, is_package))
     }
     assert found == {}
+
+
+def test_no_circle_of_modules(repository: Path) -> None:
+    every = {name: (source, is_package) for name, is_package, source in modules(repository)}
+    needs = {}
+    for name, (source, is_package) in every.items():
+        targets = set(imports_of(source, name, is_package))
+        # What is imported from a module is the module's; what is a module itself counts as one.
+        needs[name] = {
+            known
+            for target in targets
+            for known in (target, target.rpartition(".")[0])
+            if known in every and known not in (name, PACKAGE)
+        }
+    standing = dict(needs)
+    while True:
+        leaves = [name for name, others in standing.items() if not others & standing.keys()]
+        if not leaves:
+            break
+        for name in leaves:
+            del standing[name]
+    assert set(standing) == set()
+
+
+def test_few_modules_stand_directly_in_the_solver(repository: Path) -> None:
+    direct = [path.name for path in (repository / PACKAGE / "solver").glob("*.py")]
+    assert len(direct) <= MOST_MODULES, direct
+
+
+def test_the_tests_of_the_solver_do_without_blender(repository: Path) -> None:
+    code = """
+import sys, pytest
+for name in ("bpy", "bmesh", "mathutils", "gpu"):
+    sys.modules[name] = None  # makes importing it an error
+sys.exit(pytest.main(["--collect-only", "-q", "tests/solver"]))
+"""
+    run = subprocess.run([sys.executable, "-c", code], cwd=repository, capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stdout[-2000:]
 
 
 def test_everything_below_the_blender_layer_imports_without_blender(repository: Path) -> None:

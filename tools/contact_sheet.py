@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from qc3d_addon.figures.shading import VIEWS, Floats, Ints
-from qc3d_addon.figures.sheets import Row, save_sheet, straight_blend
+from qc3d_paper.drawing.shading import VIEWS, Floats, Ints
+from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -65,8 +65,8 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     """The user's own keys and the in-betweens that were baked between them."""
     import bpy
 
-    from qc3d_addon.blender.mesh_data import key_coordinates, triangles
-    from qc3d_addon.blender.records import Record
+    from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+    from qc3d_addon.blender.store.records import Record
 
     bpy.ops.wm.open_mainfile(filepath=str(path))
     obj = bpy.data.objects[name]
@@ -84,7 +84,7 @@ def _read_scenery(name: str) -> tuple[Floats, Ints]:
     """Positions and triangles of a mesh in the file that was read last, in the scene's coordinates."""
     import bpy
 
-    from qc3d_addon.blender.mesh_data import triangles
+    from qc3d_addon.blender.store.mesh_data import triangles
 
     if name not in bpy.data.objects:
         raise SystemExit(f"There is no object {name!r}.")

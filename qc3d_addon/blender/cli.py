@@ -14,7 +14,7 @@ def run_command(arguments: list[str]) -> int:
     # Imported when the command runs: Blender registers it each time it starts.
     with interruptible():
         try:
-            from ..cli import main
+            from ..cli.main import main
 
             return main(arguments)
         except KeyboardInterrupt:  # while the libraries were loaded

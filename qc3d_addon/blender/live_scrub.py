@@ -18,13 +18,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
-from . import compat, shape_keys, slider
-from .mesh_data import key_coordinates, set_key_coordinates
-from .records import Chain, Record
+from . import compat
+from .keys import shape_keys, slider
+from .store.mesh_data import key_coordinates, set_key_coordinates
+from .store.records import Chain, Record
 
 if TYPE_CHECKING:
-    from ..solver.preview import PreviewCurve
-    from .plans import Plan
+    from ..solver.frames.preview import PreviewCurve
+    from .bake.plan import Plan
 
 KEY = "QC3D Preview"
 

@@ -46,7 +46,7 @@ class QC3DPreferences(bpy.types.AddonPreferences):
 
 def limits(context: bpy.types.Context) -> "Limits":
     """What the child process may use."""
-    from ..solver.memory import machine_limit_mb
+    from ..solver.support.memory import machine_limit_mb
     from ..worker.client import Limits
 
     addon = context.preferences.addons.get(_PACKAGE)

@@ -12,12 +12,13 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
-from ..solver.settings import OF_THE_FIT, Settings
-from . import checks, heat_map
-from .heat_colours import MEASURE_ITEMS
-from .names import MAX_STEPS
-from .records import Record
-from .requests import BakeRequest
+from ..solver.settings import FitOptions, FrameOptions
+from .bake.request import BakeRequest
+from .heat_map import heat_map
+from .heat_map.colors import MEASURE_ITEMS
+from .store import checks
+from .store.names import MAX_STEPS
+from .store.records import Record
 
 _DESCRIPTIONS = {
     "mode": {
@@ -46,8 +47,9 @@ _DESCRIPTIONS = {
         "finest": "As fine as it gets; slow",
     },
 }
-_DEFAULTS = Settings()
-_KINDS = get_type_hints(Settings)
+_OPTIONS = (FitOptions, FrameOptions)
+_DEFAULTS = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
+_KINDS = get_type_hints(FitOptions) | get_type_hints(FrameOptions)
 
 
 def _choice(setting: str, description: str) -> object:
@@ -57,7 +59,7 @@ def _choice(setting: str, description: str) -> object:
         name=setting.capitalize(),
         description=description,
         items=[(name, name.capitalize(), texts.get(name, "")) for name in get_args(_KINDS[setting])],
-        default=getattr(_DEFAULTS, setting),
+        default=_DEFAULTS[setting],
         options={'SKIP_SAVE'},
     )
 
@@ -81,7 +83,7 @@ class MapChoices:
     extra_turns: IntProperty(
         name="Extra Turns",
         description="Full turns, between every two keys, that two shapes cannot tell",
-        default=_DEFAULTS.extra_turns,
+        default=_DEFAULTS["extra_turns"],
         min=-100,
         max=100,
         soft_min=-5,
@@ -93,7 +95,7 @@ class MapChoices:
     seed: IntProperty(
         name="Seed",
         description="Of the samples that the volume is made from",
-        default=_DEFAULTS.seed,
+        default=_DEFAULTS["seed"],
         min=0,
         options={'SKIP_SAVE'},
     )
@@ -189,14 +191,15 @@ def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSe
             setattr(properties, name, getattr(settings, name))
 
 
-def fill_panel(settings: ObjectSettings, keys: tuple[str, ...], chosen: Settings) -> None:
+def fill_panel(settings: ObjectSettings, keys: tuple[str, ...], chosen: FitOptions) -> None:
     """Let the panel show the keys of a map and what it was made with."""
     settings.from_key, settings.to_key = keys[0], keys[-1]
     settings.via.clear()
     for name in keys[1:-1]:
         settings.via.add().name = name
-    for name in OF_THE_FIT:
-        setattr(settings, name, getattr(chosen, name))
+    for field in fields(FitOptions):
+        if hasattr(settings, field.name):
+            setattr(settings, field.name, getattr(chosen, field.name))
 
 
 def key_names(choices: MapChoices) -> tuple[str, ...]:
@@ -204,10 +207,10 @@ def key_names(choices: MapChoices) -> tuple[str, ...]:
     return (choices.from_key, *(inner.name for inner in choices.via), choices.to_key)
 
 
-def solver_settings(choices: MapChoices) -> Settings:
-    """The choices that are the solver's; the others stay at their defaults."""
-    names = [field.name for field in fields(Settings) if hasattr(choices, field.name)]
-    return Settings(**{name: getattr(choices, name) for name in names})
+def fit_options(choices: MapChoices) -> FitOptions:
+    """What the fit depends on; what the panel does not offer stays at its default."""
+    names = [field.name for field in fields(FitOptions) if hasattr(choices, field.name)]
+    return FitOptions(**{name: getattr(choices, name) for name in names})
 
 
 def bake_request(choices: BakeChoices) -> BakeRequest:
@@ -215,7 +218,8 @@ def bake_request(choices: BakeChoices) -> BakeRequest:
     return BakeRequest(
         keys=key_names(choices),
         count=choices.count,
-        settings=solver_settings(choices),
+        fit_options=fit_options(choices),
+        frame_options=FrameOptions(choices.mode, choices.easing),
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
         tolerance=choices.tolerance if choices.use_tolerance else 0.0,
         colliders=choices.colliders,

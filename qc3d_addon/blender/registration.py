@@ -7,7 +7,9 @@ from __future__ import annotations
 import bpy
 
 from ..worker import engines
-from . import cli, compat, jobs, legend, live_scrub, panel_results, panels, preferences, presets, properties
+from . import cli, compat, live_scrub, preferences, properties
+from .bake import jobs
+from .heat_map import legend
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -23,6 +25,7 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_ke
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
+from .ui import panel_results, panels, presets
 
 CLASSES = (
     properties.InnerKey,  # before what has it

@@ -1,84 +1,131 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user may choose, checked once."""
+"""What a user may choose, checked once: how a pair of keys is fitted, and how frames are made from the fit."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Integral, Real
-from typing import Literal, get_args
+from typing import Any, Literal, TypedDict, get_args
 
-from .easing import Easing
 from .errors import InputError
-from .stretch import StretchLaw
 
 Mode = Literal["natural", "linear", "straight"]
+Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]
+StretchLaw = Literal["linear", "logarithmic"]
 
-
-# What a prepared map depends on; the other choices are about frames.
-OF_THE_FIT = ("stretch", "extra_turns", "engine", "quality", "seed")
+_MOST_TURNS = 100
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The choices of one bake.
+class FitOptions:
+    """What the fit of two keys depends on; a fit made with other options must be made anew.
+
+    Parameters
+    ----------
+    engine
+        What fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
+    quality
+        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``.
+    seed
+        Seed of the random samples of the ``delaunay`` engine, 0 or more.
+    stretch
+        How mode ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
+    extra_turns
+        Full turns, -100..100, that two shapes cannot tell: mode ``natural`` adds them to parts that turn freely, each
+        about its own axis. Where a part is pinned by still vertices, a non-zero value also frees vertices that return
+        to their place after full turns.
+    mesh_time_limit
+        Seconds after which a tetwild run is stopped.
+
+    Raises
+    ------
+    InputError
+        If a value is of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> FitOptions(quality="fine").quality
+    'fine'
+    """
+
+    engine: Engine = "delaunay"
+    quality: Quality = "normal"
+    seed: int = 0
+    stretch: StretchLaw = "linear"
+    extra_turns: int = 0
+    mesh_time_limit: float = 120.0
+
+    def __post_init__(self) -> None:
+        _require_choices(self, {"engine": Engine, "quality": Quality, "stretch": StretchLaw})
+        _require_whole(self.seed, "seed")
+        _require_whole(self.extra_turns, "number of extra turns")
+        if not -_MOST_TURNS <= self.extra_turns <= _MOST_TURNS:
+            raise InputError(
+                f"{self.extra_turns} extra turns are asked for; choose a number from -{_MOST_TURNS} to {_MOST_TURNS}."
+            )
+        if self.seed < 0:
+            raise InputError(f"The seed is {self.seed}; it must be 0 or more.")
+        limit = self.mesh_time_limit
+        if not isinstance(limit, Real) or isinstance(limit, bool) or not limit > 0.0:
+            raise InputError(f"The time limit of meshing is {limit!r}; it must be a positive number of seconds.")
+
+    @property
+    def identity(self) -> str:
+        """The options as one text: fits with the same text can take each other's place."""
+        return f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
+
+
+class FitChoices(TypedDict, total=False):
+    """The options of a fit as keyword arguments."""
+
+    engine: Engine
+    quality: Quality
+    seed: int
+    stretch: StretchLaw
+    extra_turns: int
+    mesh_time_limit: float
+
+
+@dataclass(frozen=True)
+class FrameOptions:
+    """How frames are made from a fit; other frames of the same fit may use others.
 
     Parameters
     ----------
     mode
-        How in-betweens are made: ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme,
-        ``straight`` moves every vertex along a straight line, without a map.
-    stretch
-        How ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
+        ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme (Chen & Lui, section 6.1),
+        ``straight`` moves every vertex along a straight line and needs no fit.
     easing
         How far along the way the in-betweens are: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
-    extra_turns
-        Full turns, -100..100, that two shapes cannot tell: mode ``natural`` adds them to parts that turn freely, each
-        about its own axis. In parts that are held, any number but 0 lets what is back in its place after whole turns
-        turn with the rest.
-    engine
-        What fills the cube: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
-    quality
-        How fine the volume is: ``normal``, ``fine`` or ``finest``.
-    seed
-        Seed of the random samples of the ``delaunay`` engine.
-    mesh_time_limit
-        Seconds after which a tetwild run is stopped.
+
+    Raises
+    ------
+    InputError
+        If a value is none of these.
+
+    Examples
+    --------
+    >>> FrameOptions(easing="ease-in")
+    FrameOptions(mode='natural', easing='ease-in')
     """
 
     mode: Mode = "natural"
-    stretch: StretchLaw = "linear"
     easing: Easing = "linear"
-    extra_turns: int = 0
-    engine: Engine = "delaunay"
-    quality: Quality = "normal"
-    seed: int = 0
-    mesh_time_limit: float = 120.0
 
     def __post_init__(self) -> None:
-        kinds = {"mode": Mode, "stretch": StretchLaw, "easing": Easing, "engine": Engine, "quality": Quality}
-        for name, kind in kinds.items():
-            value, choices = getattr(self, name), get_args(kind)
-            if value not in choices:
-                raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
-        for name, what in (("extra_turns", "number of extra turns"), ("seed", "seed")):
-            value = getattr(self, name)
-            if not isinstance(value, Integral) or isinstance(value, bool):
-                raise InputError(f"The {what} is {value!r}; it must be a whole number.")
-            object.__setattr__(self, name, int(value))  # of numpy's, which JSON does not know
-        limit = self.mesh_time_limit
-        if not isinstance(limit, Real) or isinstance(limit, bool):
-            raise InputError(f"The time limit of meshing is {limit!r}; it must be a number of seconds.")
-        if not -100 <= self.extra_turns <= 100:
-            raise InputError(f"{self.extra_turns} extra turns are asked for; choose a number from -100 to 100.")
-        if self.seed < 0:
-            raise InputError(f"The seed is {self.seed}; it must be 0 or more.")
-        if not self.mesh_time_limit > 0.0:
-            raise InputError(f"The time limit of meshing is {self.mesh_time_limit} s; it must be positive.")
+        _require_choices(self, {"mode": Mode, "easing": Easing})
 
-    @property
-    def preparation(self) -> str:
-        """The choices that a prepared map depends on; a map prepared with others must be made anew."""
-        return f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
+
+def _require_choices(options: object, kinds: dict[str, Any]) -> None:
+    for name, kind in kinds.items():
+        value, choices = getattr(options, name), get_args(kind)
+        if not isinstance(value, str) or value not in choices:
+            raise InputError(f"Unknown {name} {value!r}; choose one of {', '.join(choices)}.")
+
+
+def _require_whole(value: object, name: str) -> None:
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise InputError(f"The {name} is {value!r}; it must be a whole number.")

@@ -19,10 +19,10 @@ from pathlib import Path
 
 from ..solver import errors
 from ..solver.errors import InputError, QC3DError, WorkerError
-from ..solver.interpreter import interpreter
-from ..solver.pipeline import STAGES, Progress
-from ..solver.private_folders import PrivateFolder
-from ..solver.task import Outcome, Task
+from ..solver.frames.task import Outcome, Task
+from ..solver.support.child_python import interpreter
+from ..solver.support.private_folders import PrivateFolder
+from ..solver.support.progress import STAGES, Progress
 from .exchange import read_outcome, write_task
 from .idleness import LONGEST_IDLE, Idleness
 
@@ -223,9 +223,9 @@ def _message(text: bytes) -> Progress | list[str]:
     if message == {"done": True}:
         return []
     if set(message) == {"progress"}:
-        stage, fraction = message["progress"]
-        if stage in STAGES and 0.0 <= fraction <= 1.0:
-            return Progress(stage, float(fraction))
+        stage, fraction, fit, fits = message["progress"]
+        if stage in STAGES and 0.0 <= fraction <= 1.0 and type(fit) is type(fits) is int and 0 <= fit <= fits:
+            return Progress(stage, float(fraction), fit, fits)
     elif set(message) == {"error"}:
         kind, sentence = message["error"]
         if isinstance(kind, str) and isinstance(sentence, str):

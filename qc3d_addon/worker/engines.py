@@ -7,7 +7,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from ..solver import tetwild_loading
+from ..solver.meshing import tetwild_loading
 
 _TAKES_OVER = "The engine delaunay does the work here, since tetwild cannot: {}."
 

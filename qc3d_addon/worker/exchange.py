@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..solver.colliders import Collider
-from ..solver.keypair import KeyPair
-from ..solver.pipeline import Bake
-from ..solver.settings import Settings
-from ..solver.task import Outcome, Task
+from ..solver.collision.colliders import Collider
+from ..solver.frames.bake import Bake
+from ..solver.frames.report import BakeReport
+from ..solver.frames.task import Outcome, Task
+from ..solver.keys.keypair import KeyPair
+from ..solver.settings import FitOptions, FrameOptions
 
 _TASK, _OUTCOME = "task.json", "outcome.json"
 
@@ -29,9 +30,13 @@ def write_task(folder: Path, task: Task) -> None:
     np.save(folder / "times.npy", task.times, allow_pickle=False)
     if task.collider is not None:
         np.savez(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
-    _write_json(
-        folder / _TASK, {"ends": list(task.pairs), "through": task.through, "settings": asdict(task.settings)}
-    )
+    header = {
+        "ends": list(task.pairs),
+        "through": task.through,
+        "fit_options": asdict(task.fit_options),
+        "frame_options": asdict(task.frame_options),
+    }
+    _write_json(folder / _TASK, header)
 
 
 def read_task(folder: Path) -> Task:
@@ -49,20 +54,21 @@ def read_task(folder: Path) -> Task:
     if (folder / "collider.npz").exists():
         with np.load(folder / "collider.npz", allow_pickle=False) as stored:
             collider = Collider(stored["shapes"], stored["faces"])
-    return Task(pairs, tuple(header["through"]), Settings(**header["settings"]), times, kept, collider)
+    options = FitOptions(**header["fit_options"]), FrameOptions(**header["frame_options"])
+    return Task(pairs, tuple(header["through"]), *options, times, kept, collider)
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
     """Put what came of the task beside it."""
-    for number, data in enumerate(outcome.maps.values()):
+    for number, data in enumerate(outcome.fits.values()):
         (folder / f"made{number}.map").write_bytes(data)
     report = None
     if outcome.bake is not None:
         arrays: dict[str, Any] = {"times": outcome.bake.times, "frames": outcome.bake.frames}
         arrays |= {f"measure {name}": values for name, values in outcome.bake.measures.items()}
         np.savez(folder / "bake.npz", **arrays)
-        report = outcome.bake.report
-    _write_json(folder / _OUTCOME, {"ends": list(outcome.maps), "report": report})
+        report = outcome.bake.report.as_json()
+    _write_json(folder / _OUTCOME, {"ends": list(outcome.fits), "report": report})
 
 
 def read_outcome(folder: Path, task: Task) -> Outcome:
@@ -78,7 +84,7 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
         (first, second): (folder / f"made{number}.map").read_bytes()
         for number, (first, second) in enumerate(header["ends"])
     }
-    if maps.keys() != (task.pairs.keys() if task.needs_maps else set()):
+    if maps.keys() != (task.pairs.keys() if task.needs_fits else set()):
         raise ValueError("the maps belong to other keys")
     if not len(task.times):
         return Outcome(maps, None)
@@ -90,7 +96,7 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
         raise ValueError("the frames are not those asked for")
     if not np.isfinite(frames).all():
         raise ValueError("a frame has positions that are not finite")
-    return Outcome(maps, Bake(times, frames, dict(header["report"]), measures))
+    return Outcome(maps, Bake(times, frames, BakeReport.from_json(header["report"]), measures))
 
 
 def _write_json(path: Path, values: dict[str, Any]) -> None:

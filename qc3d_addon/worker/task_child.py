@@ -45,7 +45,7 @@ def main(arguments: list[str]) -> None:
     importlib.import_module(f"{name}.start").one_thread_each()
     errors = importlib.import_module(f"{name}.solver.errors")
     try:
-        task = importlib.import_module(f"{name}.solver.task")
+        task = importlib.import_module(f"{name}.solver.frames.task")
         exchange = importlib.import_module(f"{name}.worker.exchange")
         _limit_memory(memory)  # after the libraries are there: OpenBLAS waits forever for memory it does not get
         steps = task.carry_out(exchange.read_task(folder))

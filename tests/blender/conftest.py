@@ -14,13 +14,14 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
-from qc3d_addon.blender import records, slider  # noqa: E402
-from qc3d_addon.solver import pipeline, preparation  # noqa: E402
-from qc3d_addon.solver.meshing import FilledCube  # noqa: E402
-from qc3d_addon.solver.pipeline import Progress  # noqa: E402
-from qc3d_addon.solver.settings import Settings  # noqa: E402
-from qc3d_addon.solver.task import Outcome, Task, carry_out  # noqa: E402
-from qc3d_addon.solver.tetmesh import TetMesh  # noqa: E402
+from qc3d_addon.blender.keys import slider  # noqa: E402
+from qc3d_addon.blender.store import records  # noqa: E402
+from qc3d_addon.solver.fit import fit_pair  # noqa: E402
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
+from qc3d_addon.solver.meshing.cube import FilledCube  # noqa: E402
+from qc3d_addon.solver.settings import FitOptions  # noqa: E402
+from qc3d_addon.solver.support.progress import Progress, finish  # noqa: E402
+from qc3d_addon.solver.tets.mesh import TetMesh  # noqa: E402
 from qc3d_addon.worker import client  # noqa: E402
 
 Shapes = dict[str, np.ndarray]
@@ -36,19 +37,19 @@ def addon() -> Iterator[None]:
 
 
 @pytest.fixture
-def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
-    """Fill the cube with six tetrahedra only; the settings of each call.
+def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
+    """Fill the cube with six tetrahedra only; the options of each call.
 
     Their corners are the cube's own, which no map moves: the rest of the solver runs as it is, in milliseconds, and its
     mode ``linear`` gives the straight blend.
     """
     calls = []
 
-    def fill_cube(points: np.ndarray, faces: np.ndarray, settings: Settings) -> FilledCube:
-        calls.append(settings)
+    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions) -> FilledCube:
+        calls.append(options)
         return six_tetrahedra()
 
-    monkeypatch.setattr(preparation, "fill_cube", fill_cube)
+    monkeypatch.setattr(fit_pair, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
 
@@ -68,7 +69,7 @@ def work_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _work_here(monkeypatch: pytest.MonkeyPatch) -> None:
     def run(task: Task, on_progress: Callable[[Progress], None] | None, limits: object) -> Outcome:
-        return pipeline.finish(carry_out(task), on_progress)
+        return finish(carry_out(task), on_progress)
 
     monkeypatch.setattr(client, "run", run)
 

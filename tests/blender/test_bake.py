@@ -150,7 +150,7 @@ class TestKeys:
             figure[slider] = 0.0
 
     def test_wire_edges_and_large_faces_are_read(self, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-        from qc3d_addon.solver.keypair import KeyPair
+        from qc3d_addon.solver.keys.keypair import KeyPair
 
         pairs = []
         checked = KeyPair.checked
@@ -247,8 +247,8 @@ class TestSlider:
         assert all(driver.is_simple_expression and driver.is_valid for driver in drivers.values())
 
     def test_a_key_that_is_on_by_itself_is_pointed_out(self, figure: bpy.types.Object) -> None:
-        from qc3d_addon.blender.bake import bake_object
-        from qc3d_addon.blender.requests import BakeRequest
+        from qc3d_addon.blender.bake.request import BakeRequest
+        from qc3d_addon.blender.bake.run import bake_object
 
         figure.data.shape_keys.key_blocks["Lean"].value = 0.5
         result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1))

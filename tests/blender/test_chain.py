@@ -5,17 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any, get_args
 
 import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.bake import bake_object
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.easing import Easing, eased
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.solver.frames.easing import eased
+from qc3d_addon.solver.settings import Easing, FitOptions, FrameOptions
 
 Shapes = dict[str, np.ndarray]
 ReadShapes = Callable[[bpy.types.Object], Shapes]
@@ -85,7 +87,7 @@ class TestKeys:
         assert np.array_equal(shown(figure), before)
 
     def test_a_chain_and_its_pairs_live_beside_each_other(
-        self, figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[Settings]
+        self, figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[FitOptions]
     ) -> None:
         bake("Basis", "Lean")
         pair = shapes(figure)
@@ -105,7 +107,7 @@ class TestKeys:
 
 class TestBakingAgain:
     def test_the_same_bake_again_changes_nothing(
-        self, figure: bpy.types.Object, quick_map: list[Settings], state: State
+        self, figure: bpy.types.Object, quick_map: list[FitOptions], state: State
     ) -> None:
         bake(use_keyframes=True)
         before = state()
@@ -114,7 +116,7 @@ class TestBakingAgain:
         assert len(quick_map) == 2
 
     def test_only_pairs_with_a_changed_key_are_prepared_again(
-        self, figure: bpy.types.Object, quick_map: list[Settings], shapes: ReadShapes
+        self, figure: bpy.types.Object, quick_map: list[FitOptions], shapes: ReadShapes
     ) -> None:
         bake()
         figure.data.shape_keys.key_blocks["Stretch"].points[0].co.x += 0.5
@@ -127,7 +129,7 @@ class TestBakingAgain:
         assert len(quick_map) == 5
 
     def test_another_number_of_in_betweens_replaces_the_keys(
-        self, figure: bpy.types.Object, quick_map: list[Settings], shapes: ReadShapes
+        self, figure: bpy.types.Object, quick_map: list[FitOptions], shapes: ReadShapes
     ) -> None:
         bake(count=2)
         bake("Basis", "Lean")
@@ -139,7 +141,7 @@ class TestBakingAgain:
         ]
         assert len(quick_map) == 2
 
-    def test_prepare_makes_every_map_of_the_chain(self, figure: bpy.types.Object, quick_map: list[Settings]) -> None:
+    def test_prepare_makes_every_map_of_the_chain(self, figure: bpy.types.Object, quick_map: list[FitOptions]) -> None:
         keys = {"from_key": "Basis", "via": [{"name": "Lean"}], "to_key": "Stretch"}
         assert bpy.ops.qc3d.prepare(**keys) == {'FINISHED'}
         bake()
@@ -159,7 +161,7 @@ class TestEasing:
             assert np.abs(shown(figure, **{"Basis→Lean": step / 4}) - blend).max() < 1e-6
 
     def test_another_easing_gives_the_same_keys_new_shapes(
-        self, figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[Settings]
+        self, figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[FitOptions]
     ) -> None:
         bake(easing='linear')
         before = shapes(figure)
@@ -173,7 +175,7 @@ class TestEasing:
         keys = ("Basis", "Lean", "Stretch")
 
         def said(easing: Easing, count: int = 3) -> list[str]:
-            result = bake_object(figure, BakeRequest(keys, count, Settings(mode="linear", easing=easing)))
+            result = bake_object(figure, BakeRequest(keys, count, frame_options=FrameOptions("linear", easing)))
             return [note for note in result.notes if "passes" in note]
 
         assert said("linear") == said("ease-in-out") == []  # half way is half way
@@ -204,20 +206,21 @@ class TestPanel:
         assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch") == {'FINISHED'}
         assert "Basis→Stretch" in figure
 
-    def test_every_setting_reaches_the_solver(self, figure: bpy.types.Object, quick_map: list[Settings]) -> None:
-        chosen = Settings("linear", "logarithmic", "ease-out", 2, "delaunay", "finest", 7)
-        names = ("mode", "stretch", "easing", "extra_turns", "engine", "quality", "seed")
-        for name in names:
-            setattr(figure.qc3d, name, getattr(chosen, name))
+    def test_every_setting_reaches_the_solver(self, figure: bpy.types.Object, quick_map: list[FitOptions]) -> None:
+        chosen = FitOptions("delaunay", "finest", 7, "logarithmic", 2)
+        frames = FrameOptions("linear", "ease-out")
+        for name, value in {**asdict(chosen), **asdict(frames)}.items():
+            if name != "mesh_time_limit":
+                setattr(figure.qc3d, name, value)
         figure.qc3d.from_key, figure.qc3d.to_key = "Basis", "Lean"
         bpy.ops.qc3d.bake_inbetweens()
         bpy.ops.qc3d.prepare()
-        baked, prepared = quick_map
-        assert baked == chosen
-        assert prepared.preparation == chosen.preparation
+        assert quick_map == [chosen, chosen]
+        remembered = Record.read(figure.data.shape_keys).chains[0].request["settings"]
+        assert remembered == {**asdict(chosen), **asdict(frames)}
 
     def test_it_draws_a_row_for_each_key_and_only_what_is_there(self, figure: bpy.types.Object) -> None:
-        from qc3d_addon.blender.panels import QC3D_PT_inbetweens
+        from qc3d_addon.blender.ui.panels import QC3D_PT_inbetweens
 
         figure.qc3d.from_key, figure.qc3d.to_key = "Basis", "Stretch"
         figure.qc3d.via.add().name = "Lean"
@@ -273,7 +276,7 @@ class TestPanel:
     ],
 )
 def test_keys_that_are_no_chain(
-    figure: bpy.types.Object, quick_map: list[Settings], state: State, names: tuple[str, ...], said: str
+    figure: bpy.types.Object, quick_map: list[FitOptions], state: State, names: tuple[str, ...], said: str
 ) -> None:
     flat = figure.shape_key_add(name="Flat", from_mix=False)
     flat.points.foreach_set("co", np.zeros(3 * len(flat.points), dtype=np.float32))

@@ -14,8 +14,11 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import compat, heat_map, kept_measures, slider
-from qc3d_addon.blender.records import PROPERTY, Record
+from qc3d_addon.blender import compat
+from qc3d_addon.blender.heat_map import heat_map
+from qc3d_addon.blender.keys import slider
+from qc3d_addon.blender.store import kept_measures
+from qc3d_addon.blender.store.records import PROPERTY, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 

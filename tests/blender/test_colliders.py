@@ -11,13 +11,13 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import plans
-from qc3d_addon.blender.colliders import read_colliders
-from qc3d_addon.blender.records import Record
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.colliders import Collider
-from qc3d_addon.solver.pipeline import finish
-from qc3d_addon.solver.task import carry_out
+from qc3d_addon.blender.bake import plan as plans
+from qc3d_addon.blender.bake.colliders import read_colliders
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.collision.colliders import Collider
+from qc3d_addon.solver.frames.task import carry_out
+from qc3d_addon.solver.support.progress import finish
 
 THROUGH = ("Basis", "Lean")
 State = Callable[[], dict[str, Any]]

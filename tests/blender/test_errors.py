@@ -13,9 +13,11 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import shape_keys, slider
-from qc3d_addon.solver import pipeline, task
+from qc3d_addon.blender.keys import shape_keys, slider
 from qc3d_addon.solver.errors import MeshingError
+from qc3d_addon.solver.frames import task
+from qc3d_addon.solver.frames.bake import Bake
+from qc3d_addon.solver.support.progress import Progress, Steps
 
 State = Callable[[], dict[str, object]]
 OPERATORS = [bpy.ops.qc3d.bake_inbetweens, bpy.ops.qc3d.prepare]
@@ -234,11 +236,11 @@ class TestLaterFailures:
     def test_a_map_that_is_not_found(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def prepare(*arguments: object) -> Iterator[pipeline.Progress]:
-            yield pipeline.Progress("fit", 0.5)
+        def fit_pair(*arguments: object) -> Iterator[Progress]:
+            yield Progress("fit", 0.5)
             raise MeshingError("No map without folds was found; try a finer quality.")
 
-        monkeypatch.setattr(task, "prepare", prepare)
+        monkeypatch.setattr(task, "fit_pair", fit_pair)
         before = state()
         assert bake() == "Error: No map without folds was found; try a finer quality."
         assert refused(bpy.ops.qc3d.prepare) == "Error: No map without folds was found; try a finer quality."
@@ -254,14 +256,14 @@ class TestLaterFailures:
         value: float,
         said: str,
     ) -> None:
-        chain_inbetweens = pipeline.chain_inbetweens
+        chain_frames = task.chain_frames
 
-        def spoiled(*arguments: object) -> pipeline.Steps[pipeline.Bake]:
-            made = yield from chain_inbetweens(*arguments)
+        def spoiled(*arguments: object) -> Steps[Bake]:
+            made = yield from chain_frames(*arguments)
             made.frames[2, 4, 1] = value
             return made
 
-        monkeypatch.setattr(task, "chain_inbetweens", spoiled)
+        monkeypatch.setattr(task, "chain_frames", spoiled)
         before = state()
         assert said in bake()
         assert state() == before

@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import heat_map, kept_measures
-from qc3d_addon.blender.heat_colours import linear, scale_of
+from qc3d_addon.blender.heat_map import heat_map
+from qc3d_addon.blender.heat_map.colors import linear, scale_of
+from qc3d_addon.blender.store import kept_measures
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -217,13 +218,13 @@ class TestWorstPlace:
         ratio = edge_ratios(shapes[baked.active_shape_key.name], shapes["Basis"], mesh)
         key = edge_ratios(shapes["Lean"], shapes["Basis"], mesh)
         excess = np.maximum(ratio / np.maximum(key, 1.0), np.minimum(key, 1.0) / ratio) - 1.0
-        from qc3d_addon.blender.records import Record
+        from qc3d_addon.blender.store.records import Record
 
         stored = Record.read(mesh.shape_keys).chains[0].result.worst
         assert stored.excess == pytest.approx(excess.max(), rel=0.05)
 
     def test_a_mesh_that_lost_the_vertex(self, baked: bpy.types.Object) -> None:
-        from qc3d_addon.blender.records import Record
+        from qc3d_addon.blender.store.records import Record
 
         record = Record.read(baked.data.shape_keys)
         result = record.chains[0].result

@@ -85,7 +85,7 @@ def test_each_ending_of_the_child_leaves_the_file_as_it_was(
 
 
 def test_an_interrupt_of_blenders_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    from qc3d_addon import cli as command
+    from qc3d_addon.cli import main as command
 
     def main(arguments: list[str]) -> int:
         os.kill(os.getpid(), signal.SIGINT)

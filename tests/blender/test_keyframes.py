@@ -7,7 +7,8 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from qc3d_addon.blender import compat, slider
+from qc3d_addon.blender import compat
+from qc3d_addon.blender.keys import slider
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -65,8 +66,8 @@ def test_another_range_moves_the_keyframes_that_a_bake_made(figure: bpy.types.Ob
 
 
 def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
-    from qc3d_addon.blender.bake import bake_object
-    from qc3d_addon.blender.requests import BakeRequest
+    from qc3d_addon.blender.bake.request import BakeRequest
+    from qc3d_addon.blender.bake.run import bake_object
 
     bake()
     figure[SLIDER] = 0.25

@@ -15,7 +15,7 @@ import pytest
 
 import qc3d_addon
 from qc3d_addon.blender import live_scrub
-from qc3d_addon.solver.task import Outcome
+from qc3d_addon.solver.frames.task import Outcome
 from qc3d_addon.worker import client
 
 pytestmark = pytest.mark.usefixtures("quick_map")

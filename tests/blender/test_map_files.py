@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.records import Record
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.settings import FitOptions
 
 State = Callable[[], dict[str, Any]]
 
@@ -23,7 +23,7 @@ def bake(**choices: object) -> None:
 
 
 @pytest.fixture
-def saved(figure: bpy.types.Object, quick_map: list[Settings], tmp_path: Path) -> Path:
+def saved(figure: bpy.types.Object, quick_map: list[FitOptions], tmp_path: Path) -> Path:
     """The maps of a chain, saved; then the file from before the bake again."""
     blend, path = tmp_path / "before.blend", tmp_path / "figure.qc3dmap"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
@@ -34,7 +34,7 @@ def saved(figure: bpy.types.Object, quick_map: list[Settings], tmp_path: Path) -
     return path
 
 
-def test_loaded_maps_are_used(saved: Path, quick_map: list[Settings]) -> None:
+def test_loaded_maps_are_used(saved: Path, quick_map: list[FitOptions]) -> None:
     obj = bpy.context.active_object
     assert not Record.read(obj.data.shape_keys).maps
     assert bpy.ops.qc3d.load_map(filepath=str(saved)) == {"FINISHED"}
@@ -94,7 +94,7 @@ def test_what_does_not_belong_changes_nothing(saved: Path, change: str, sentence
 
 
 def test_maps_of_keys_that_were_changed_are_not_saved(
-    figure: bpy.types.Object, quick_map: list[Settings], tmp_path: Path
+    figure: bpy.types.Object, quick_map: list[FitOptions], tmp_path: Path
 ) -> None:
     bake(from_key="Basis", to_key="Lean")
     figure.data.shape_keys.key_blocks["Lean"].points[0].co.x += 0.001
@@ -103,7 +103,7 @@ def test_maps_of_keys_that_were_changed_are_not_saved(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_file_must_be_named(figure: bpy.types.Object, quick_map: list[Settings], tmp_path: Path) -> None:
+def test_a_file_must_be_named(figure: bpy.types.Object, quick_map: list[FitOptions], tmp_path: Path) -> None:
     bake(from_key="Basis", to_key="Lean")
     with pytest.raises(RuntimeError, match="Name a file to write to"):
         bpy.ops.qc3d.save_map()

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import live_scrub
-from qc3d_addon.blender.plans import Plan, plan_bake, plan_maps, write_bake, write_maps
-from qc3d_addon.blender.requests import BakeRequest
+from qc3d_addon.blender.bake.plan import Plan, plan_bake, plan_maps, write_bake, write_maps
+from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.pipeline import finish
-from qc3d_addon.solver.task import Outcome, carry_out
+from qc3d_addon.solver.frames.task import Outcome, carry_out
+from qc3d_addon.solver.support.progress import finish
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 

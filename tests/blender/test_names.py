@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qc3d_addon.blender.names import LIMIT, MAX_STEPS, chain_label, key_name
+from qc3d_addon.blender.store.names import LIMIT, MAX_STEPS, chain_label, key_name
 
 # What Blender can hold as a key's name: up to 63 bytes.
 key_names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=63).filter(

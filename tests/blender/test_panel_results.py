@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from qc3d_addon.blender.panel_results import QC3D_PT_results
+from qc3d_addon.blender.ui.panel_results import QC3D_PT_results
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 

@@ -10,8 +10,8 @@ from typing import Any, get_args
 import bpy
 import pytest
 
-from qc3d_addon.blender.records import Record
-from qc3d_addon.solver import storage
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.fit import storage
 from qc3d_addon.solver.settings import Mode
 
 PAIR = {"from_key": "Basis", "to_key": "Lean"}
@@ -35,14 +35,14 @@ def reload(folder: Path) -> None:
 def test_a_real_map_survives_saving_and_loading(
     figure: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work_here: None
 ) -> None:
-    from qc3d_addon.solver import task
+    from qc3d_addon.solver.frames import task
 
     real = {"quality": 'normal', "engine": 'delaunay'}
     assert bpy.ops.qc3d.prepare(**PAIR, **real) == {'FINISHED'}
     kept = map_properties()
     reload(tmp_path)
     assert map_properties() == kept
-    monkeypatch.setattr(task, "prepare", None)  # a call would raise
+    monkeypatch.setattr(task, "fit_pair", None)  # a call would raise
     bake(**real)
     assert map_properties() == kept
 
@@ -102,11 +102,11 @@ def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[An
     assert len(quick_map) == 2
 
 
-@pytest.mark.parametrize(("version", "which"), [(0, "an earlier"), (2, "a later")])
+@pytest.mark.parametrize(("version", "which"), [(-1, "an earlier"), (1, "a later")])
 def test_a_map_of_another_version_is_made_again_and_a_note_says_so(
     figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, version: int, which: str
 ) -> None:
-    monkeypatch.setattr(storage, "FORMAT_VERSION", version)
+    monkeypatch.setattr(storage, "FORMAT_VERSION", storage.FORMAT_VERSION + version)
     assert bpy.ops.qc3d.prepare(**PAIR) == {'FINISHED'}
     monkeypatch.undo()
     bake()
@@ -124,7 +124,7 @@ def test_a_map_of_another_version_is_not_saved_as_a_file(
     figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     bake()
-    monkeypatch.setattr(storage, "FORMAT_VERSION", 2)
+    monkeypatch.setattr(storage, "FORMAT_VERSION", storage.FORMAT_VERSION + 1)
     with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
         bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
     assert list(tmp_path.iterdir()) == []

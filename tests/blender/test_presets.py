@@ -10,7 +10,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from qc3d_addon.blender import jobs, preferences, presets
+from qc3d_addon.blender import preferences
+from qc3d_addon.blender.bake import jobs
+from qc3d_addon.blender.ui import presets
 from qc3d_addon.worker.client import Limits
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import compat
-from qc3d_addon.blender.records import PROPERTY, Record
+from qc3d_addon.blender.store.records import PROPERTY, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 

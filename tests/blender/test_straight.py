@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import kept_measures
-from qc3d_addon.blender.records import Record
+from qc3d_addon.blender.store import kept_measures
+from qc3d_addon.blender.store.records import Record
 
 Shapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
 CHOICES = {"from_key": "Basis", "to_key": "Mirrored", "count": 3, "engine": 'delaunay', "quality": 'normal'}

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.records import Chain, Record
-from qc3d_addon.blender.requests import DENSE_STEPS
+from qc3d_addon.blender.bake.request import DENSE_STEPS
+from qc3d_addon.blender.store.records import Chain, Record
 
 SLIDER = "Basis→Bent"
 ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.records import Record
+from qc3d_addon.blender.store.records import Record
 
 OPEN_ALONE = """
 import json, sys

@@ -20,15 +20,17 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
-from qc3d_addon.commands.reconstruct import read_landmarks
-from qc3d_addon.solver import compressed_files, map_files, storage
-from qc3d_addon.solver.array_files import read_pairs
-from qc3d_addon.solver.compression import Compressed
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.mapping_files import TetFile, read_tets, write_tets
-from qc3d_addon.solver.prepared import PreparedMap
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import TetMesh
+from qc3d_addon.cli.reconstruct import read_landmarks
+from qc3d_addon.solver.compression import files as compressed_files
+from qc3d_addon.solver.compression.codec import Compressed
+from qc3d_addon.solver.fit import files as map_files
+from qc3d_addon.solver.fit import storage
+from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.keys.files import read_pairs
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.maps.files import TetFile, read_tets, write_tets
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.tets.mesh import TetMesh
 
 from ..solver.meshes import icosphere, jittered_grid
 
@@ -113,13 +115,14 @@ def _stored_map() -> bytes:
     mesh = _mesh()
     maps = np.stack([mesh.points, _moved()])
     turns = np.zeros((len(mesh.tets), 3))
-    return storage.to_bytes(PreparedMap(_pair(), mesh, maps, turns, 0, "delaunay", "finest", ("Two.",), {}))
+    return storage.to_bytes(FittedMap(_pair(), mesh, maps, turns, 0, "delaunay", "finest", ("Two.",), {}))
 
 
 @cache
 def _maps() -> bytes:
     return _written(
-        ".qc3dmap", lambda path: map_files.write_maps(path, map_files.KeptMaps(KEYS, Settings(), {KEYS: _stored_map()}))
+        ".qc3dmap",
+        lambda path: map_files.write_maps(path, map_files.KeptMaps(KEYS, FitOptions(), {KEYS: _stored_map()})),
     )
 
 

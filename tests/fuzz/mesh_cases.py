@@ -6,20 +6,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, get_args
 
 import numpy as np
 
-from qc3d_addon.solver.colliders import Collider
-from qc3d_addon.solver.easing import Easing
-from qc3d_addon.solver.pipeline import Bake, finish
-from qc3d_addon.solver.rotations import rotation_matrices
-from qc3d_addon.solver.sampling import RESOLUTIONS, Resolution
-from qc3d_addon.solver.settings import Mode, Settings
-from qc3d_addon.solver.stretch import StretchLaw
-from qc3d_addon.solver.task import Outcome, Task, carry_out
+from qc3d_addon.solver.collision.colliders import Collider
+from qc3d_addon.solver.frames.bake import Bake
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out
+from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.settings import Easing, FitOptions, FrameOptions, Mode, StretchLaw
+from qc3d_addon.solver.support.progress import finish
 
 from ..solver.meshes import box_surface, icosphere, twisted
 
@@ -40,7 +39,7 @@ class Mesh:
     story: list[str]
 
 
-def make(random: Random) -> tuple[Mesh, Settings, Any, Collider | None]:
+def make(random: Random) -> tuple[Mesh, FitOptions, FrameOptions, Any, Collider | None]:
     """One case: the mesh, the choices, the times of the frames and what they must not touch."""
     name, base = _pick(random, _BASES)
     points, faces = base(random)
@@ -57,10 +56,9 @@ def make(random: Random) -> tuple[Mesh, Settings, Any, Collider | None]:
         name, spoil = _pick(random, _LAST_SPOILERS)
         mesh.story.append(name)
         spoil(mesh, random)
-    settings = Settings(
-        mode=_one_of(random, get_args(Mode)),
+    frame_options = FrameOptions(_one_of(random, get_args(Mode)), _one_of(random, get_args(Easing)))
+    fit_options = FitOptions(
         stretch=_one_of(random, get_args(StretchLaw)),
-        easing=_one_of(random, get_args(Easing)),
         extra_turns=int(random.choice([0, 0, 0, 0, 1, -3, 100])),
         engine="tetwild" if random.random() < 0.05 else "delaunay",
         quality="normal",
@@ -73,15 +71,18 @@ def make(random: Random) -> tuple[Mesh, Settings, Any, Collider | None]:
         ball, ball_faces = icosphere(1, radius=10.0 ** random.uniform(-3, 1))
         collider = Collider.checked(np.stack([ball] * len(mesh.shapes)), ball_faces)
         mesh.story.append("a ball in the way")
-    mesh.story.append(f"{settings.mode} {settings.stretch} {settings.engine} {settings.extra_turns} {times}")
-    return mesh, settings, np.array(times), collider
+    mesh.story.append(f"{fit_options} {frame_options} {times}")
+    return mesh, fit_options, frame_options, np.array(times), collider
 
 
-def run(mesh: Mesh, settings: Settings, times: Array, collider: Collider | None) -> str:
+def run(
+    mesh: Mesh, fit_options: FitOptions, frame_options: FrameOptions, times: Array, collider: Collider | None
+) -> str:
     """Bake a case; what came of it in a word. Raises what the solver raises, and AssertionError of unsound results."""
     names = [f"key {number}" for number in range(len(mesh.shapes))]
-    task = Task.of_keys(dict(zip(names, mesh.shapes, strict=True)), mesh.faces, mesh.edges, names, settings, times)
-    outcome = finish(carry_out(replace(task, collider=collider)))
+    shapes = dict(zip(names, mesh.shapes, strict=True))
+    task = Task.of_keys(shapes, mesh.faces, mesh.edges, names, fit_options, frame_options, times, collider)
+    outcome = finish(carry_out(task))
     if outcome.bake is None:
         return "a map"
     _require_sound(outcome, task)
@@ -106,11 +107,11 @@ def _require_sound(outcome: Outcome, task: Task) -> None:
             assert np.array_equal(frame, along[-1].key1), "the last key is missed"
     for values in bake.measures.values():
         assert np.isfinite(values).all(), "measures that are not finite"
-    json.dumps(bake.report, allow_nan=False)
-    assert all(str(note).endswith(".") for note in bake.report["notes"]), "a note that is no sentence"
-    assert bake.report["folds"]["map"] == (0 if task.needs_maps else None), "a fitted map with folds"
-    if task.settings.mode == "natural":
-        assert not any(bake.report["folds"]["frames"]), "frames with folds"
+    json.dumps(bake.report.as_json(), allow_nan=False)
+    assert all(str(note).endswith(".") for note in bake.report.notes), "a note that is no sentence"
+    assert bake.report.folds.map == (0 if task.needs_fits else None), "a fitted map with folds"
+    if task.frame_options.mode == "natural":
+        assert not any(bake.report.folds.frames), "frames with folds"
 
 
 def _pick(random: Random, choices: dict[str, Any]) -> tuple[str, Any]:

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from qc3d_addon.solver.meshing import engine_available, fill_cube
-from qc3d_addon.solver.sampling import RESOLUTIONS, Resolution
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.tetmesh import TetMesh
+from qc3d_addon.solver.meshing.cube import fill_cube
+from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.tets.mesh import TetMesh
 
+from .baking import engine_available
 from .meshes import icosphere, jittered_grid, kuhn_grid, random_delaunay
 
 # On a busy machine any example can take long; how long a test may take is decided by its number of examples.
@@ -30,7 +31,7 @@ def mesh(request: pytest.FixtureRequest) -> TetMesh:
         return made[request.param]()
     if not engine_available(request.param):
         pytest.skip(f"the engine {request.param} cannot run here")
-    return fill_cube(*icosphere(1), Settings(engine=request.param, quality="normal")).mesh
+    return fill_cube(*icosphere(1), FitOptions(engine=request.param)).mesh
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
-from qc3d_addon.solver.regular_grid import kuhn_grid
-from qc3d_addon.solver.rotations import rotation_matrices
-from qc3d_addon.solver.tetmesh import Floats, Ints, TetMesh, edge_matrices
+from qc3d_addon.solver.arrays import Floats, Ints
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.tets.kuhn_grid import kuhn_grid
+from qc3d_addon.solver.tets.mesh import TetMesh, edge_matrices
 
 
 def jittered_grid(cells: int, seed: int, amount: float = 0.15) -> TetMesh:

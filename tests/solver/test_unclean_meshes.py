@@ -8,7 +8,6 @@ import json
 import time as clock
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import TypeVar
 
@@ -17,15 +16,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qc3d_addon.solver.crossings import crossing_pairs
+from qc3d_addon.solver.arrays import Floats, Ints
+from qc3d_addon.solver.collision.crossings import crossing_pairs
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.keypair import KeyPair
-from qc3d_addon.solver.pipeline import Bake, finish, inbetweens, prepare
-from qc3d_addon.solver.prepared import PreparedMap
-from qc3d_addon.solver.rotations import rotation_matrices
-from qc3d_addon.solver.settings import Mode, Settings
-from qc3d_addon.solver.tetmesh import Floats, Ints
+from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.frames.bake import Bake
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.settings import FitOptions, Mode
+from qc3d_addon.solver.support.progress import finish
 
+from .baking import frames_of
 from .meshes import arced, box_surface, enclosed_volume, icosphere, twisted
 
 pytestmark = pytest.mark.usefixtures("coarse_volume")
@@ -33,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("coarse_volume")
 T = TypeVar("T")
 Keys = tuple[Floats, Floats, Ints] | tuple[Floats, Floats, Ints, Ints]
 
-NORMAL = Settings(engine="delaunay", quality="normal")
+NORMAL = FitOptions()
 MODES: list[Mode] = ["natural", "linear"]
 TIMES = [0.0, 0.2, 0.5, 0.9, 1.0]
 
@@ -200,8 +202,8 @@ def pair_of(kind: str) -> KeyPair:
 
 
 @cache
-def prepared_once(kind: str) -> PreparedMap:
-    return strictly(lambda: finish(prepare(pair_of(kind), NORMAL)))
+def prepared_once(kind: str) -> FittedMap:
+    return strictly(lambda: finish(fit_pair(pair_of(kind), NORMAL)))
 
 
 def times_of(kind: str) -> list[float]:
@@ -212,8 +214,8 @@ def times_of(kind: str) -> list[float]:
 def baked_and_timed(kind: str, mode: Mode) -> tuple[Bake, float]:
     """A bake and the seconds of a processor that it took."""
     started = clock.process_time()
-    prepared = prepared_once(kind)
-    bake = strictly(lambda: finish(inbetweens(prepared, times_of(kind), replace(NORMAL, mode=mode))))
+    fitted = prepared_once(kind)
+    bake = strictly(lambda: frames_of(fitted, times_of(kind), mode))
     return bake, clock.process_time() - started
 
 
@@ -240,12 +242,12 @@ def assert_sound(bake: Bake, pair: KeyPair, mode: Mode, key_error: float = 1e-9)
     assert (bake.frames > low - 1.5 * size).all()
     assert (bake.frames < high + 1.5 * size).all()
     report = bake.report
-    json.dumps(report, allow_nan=False)
-    assert report["folds"]["map"] == 0
-    assert report["key_error"] * pair.diagonal <= key_error * size
-    assert all((proof["smallest_determinant"] <= 0.0) == (proof["folds"] > 0) for proof in report["certificates"])
+    json.dumps(report.as_json(), allow_nan=False)
+    assert report.folds.map == 0
+    assert report.key_error * pair.diagonal <= key_error * size
+    assert all((proof.smallest_determinant <= 0.0) == (proof.folds > 0) for proof in report.certificates)
     if mode == "natural":
-        assert report["folds"]["frames"] == [0] * len(bake.times)
+        assert report.folds.frames == [0] * len(bake.times)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -257,7 +259,7 @@ def test_bakes(kind: str, mode: Mode) -> None:
 class TestUnreachableKeys:
     @pytest.mark.parametrize("kind", UNREACHABLE)
     def test_refused_before_any_slow_work(self, kind: str) -> None:
-        steps = prepare(pair_of(kind), NORMAL)
+        steps = fit_pair(pair_of(kind), NORMAL)
         with pytest.raises(InputError, match=r"mirrored or turned inside out.* Choose the mode straight"):
             strictly(lambda: next(steps))
 
@@ -266,11 +268,11 @@ class TestUnreachableKeys:
     def test_parts_out_of_reach_bake_and_it_is_said(self, kind: str, mode: Mode) -> None:
         bake = baked_once(kind, mode)
         assert_sound(bake, pair_of(kind), mode)
-        assert any("mirrored or turned inside out" in note for note in bake.report["notes"])
+        assert any("mirrored or turned inside out" in note for note in bake.report.notes)
 
     def test_nothing_of_the_kind_is_said_of_others(self) -> None:
         for kind in ("clean", "nested spheres", "some faces reversed", "all faces reversed", "moved as a whole"):
-            assert baked_once(kind, "natural").report["notes"] == []
+            assert baked_once(kind, "natural").report.notes == []
 
 
 class TestManyParts:
@@ -341,8 +343,8 @@ def test_a_motion_of_everything_is_an_exact_screw(degrees: float, pitch: float, 
         turn = rotation_matrices(time * np.radians(degrees) * axis[None])[0]
         return np.asarray((BAR - place) @ turn.T + place + time * pitch * axis)
 
-    prepared = screwed_once(degrees, pitch, screw(1.0).tobytes())
-    bake = strictly(lambda: finish(inbetweens(prepared, TIMES, replace(NORMAL, mode=mode))))
+    fitted = screwed_once(degrees, pitch, screw(1.0).tobytes())
+    bake = strictly(lambda: frames_of(fitted, TIMES, mode))
     # Half a turn may go either way.
     errors = []
     for way in [1.0, -1.0] if degrees == 180.0 else [1.0]:
@@ -353,15 +355,15 @@ def test_a_motion_of_everything_is_an_exact_screw(degrees: float, pitch: float, 
 
 
 @cache
-def screwed_once(degrees: float, pitch: float, key1: bytes) -> PreparedMap:
+def screwed_once(degrees: float, pitch: float, key1: bytes) -> FittedMap:
     pair = KeyPair.checked(BAR, np.frombuffer(key1).reshape(-1, 3), FACES)
-    return finish(prepare(pair, NORMAL))
+    return finish(fit_pair(pair, NORMAL))
 
 
 def test_scaling_by_a_power_of_two_scales_every_bit() -> None:
     factor = 2.0**20
     pair = KeyPair.checked(factor * BAR, factor * BENT, FACES)
-    scaled = finish(inbetweens(finish(prepare(pair, NORMAL)), TIMES, NORMAL))
+    scaled = frames_of(finish(fit_pair(pair, NORMAL)), TIMES)
     np.testing.assert_array_equal(scaled.frames, factor * baked_once("clean", "natural").frames)
 
 
@@ -383,10 +385,9 @@ def test_soups(seed: int) -> None:
     key1[20:23] = key1[random.integers(0, 20, size=3)]
     faces, edges = random.integers(0, 30, size=(random.integers(0, 60), 3)), random.integers(0, 30, size=(10, 2))
     pair = KeyPair.checked(key0, key1, faces, edges)
-    prepared = strictly(lambda: finish(prepare(pair, NORMAL)))
+    fitted = strictly(lambda: finish(fit_pair(pair, NORMAL)))
     for mode in MODES:
-        choice = replace(NORMAL, mode=mode)
-        assert_sound(strictly(lambda choice=choice: finish(inbetweens(prepared, TIMES, choice))), pair, mode)
+        assert_sound(strictly(lambda mode=mode: frames_of(fitted, TIMES, mode)), pair, mode)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.errors import InputError, MeshingError, QC3DError, WorkerError
-from qc3d_addon.solver.pipeline import Progress, evenly_spaced, finish
-from qc3d_addon.solver.settings import Settings
-from qc3d_addon.solver.task import Task, carry_out
+from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.task import Task, carry_out
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import Progress, finish
 from qc3d_addon.worker import client, idleness
 from qc3d_addon.worker.client import Limits, Worker
 
@@ -34,8 +35,8 @@ PATIENCE = 60.0
 def small_task(quality: str = "normal") -> Task:
     points, faces = box_surface((2, 2, 6), (1.0, 1.0, 4.0))
     shapes = {"Basis": points, "Bent": twisted(points, 0.8)}
-    settings = Settings(engine="delaunay", quality=quality)  # type: ignore[arg-type]
-    return Task.of_keys(shapes, faces, np.empty((0, 2), dtype=np.int64), KEYS, settings, evenly_spaced(1))
+    options = FitOptions(quality=quality)  # type: ignore[arg-type]
+    return Task.of_keys(shapes, faces, None, KEYS, options, times=evenly_spaced(1))
 
 
 @pytest.fixture

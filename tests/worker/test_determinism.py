@@ -14,14 +14,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qc3d_addon.solver.meshing import engine_available, fill_cube
-from qc3d_addon.solver.pipeline import Bake, evenly_spaced, finish
-from qc3d_addon.solver.settings import Engine, Mode, Settings
-from qc3d_addon.solver.storage import from_bytes
-from qc3d_addon.solver.task import Outcome, Task, carry_out
+from qc3d_addon.solver.fit.storage import from_bytes
+from qc3d_addon.solver.frames.bake import Bake, evenly_spaced
+from qc3d_addon.solver.frames.task import Outcome, Task, carry_out
+from qc3d_addon.solver.meshing.cube import fill_cube
+from qc3d_addon.solver.settings import Engine, FitOptions, FrameOptions, Mode
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.worker import client
 
 from ..fuzz.mesh_cases import coarser
+from ..solver.baking import engine_available
 from ..solver.meshes import arced, box_surface, icosphere
 
 KEYS = ("Basis", "Bent")
@@ -31,10 +33,9 @@ def task_with(
     engine: Engine, mode: Mode = "natural", seed: int = 3, kept: dict[tuple[str, str], bytes] | None = None
 ) -> Task:
     points, faces = box_surface((2, 2, 8), (1.0, 1.0, 5.0))
-    settings = Settings(engine=engine, quality="normal", mode=mode, seed=seed)
+    options = FitOptions(engine=engine, seed=seed), FrameOptions(mode)
     shapes = {"Basis": points, "Bent": arced(points, 0.9)}
-    no_edges = np.empty((0, 2), dtype=np.int64)
-    return Task.of_keys(shapes, faces, no_edges, KEYS, settings, evenly_spaced(2), kept)
+    return replace(Task.of_keys(shapes, faces, None, KEYS, *options, evenly_spaced(2)), kept=kept or {})
 
 
 def frames_of(outcome: Outcome) -> bytes:
@@ -67,7 +68,7 @@ def test_another_seed_gives_another_mesh_and_other_frames() -> None:
 
 
 def test_the_seeded_mesh_is_the_same_bit_for_bit() -> None:
-    meshes = [fill_cube(*icosphere(2), Settings(engine="delaunay", quality="normal", seed=5)).mesh for _ in range(2)]
+    meshes = [fill_cube(*icosphere(2), FitOptions(seed=5)).mesh for _ in range(2)]
     np.testing.assert_array_equal(meshes[0].points, meshes[1].points)
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
 
@@ -78,20 +79,20 @@ def test_a_kept_map_gives_the_same_frames_again(engine: Engine) -> None:
     if not engine_available(engine):
         pytest.skip(f"the engine {engine} cannot run here")
     first = client.run(task_with(engine))
-    again = task_with(engine, kept=first.maps)
-    assert again.new_maps == 0
+    again = task_with(engine, kept=first.fits)
+    assert again.new_fits == 0
     outcomes = [first, client.run(again), finish(carry_out(again))]
     assert len({frames_of(outcome) for outcome in outcomes}) == 1
-    assert all(outcome.maps == first.maps for outcome in outcomes)
+    assert all(outcome.fits == first.fits for outcome in outcomes)
 
 
 def test_a_kept_map_serves_another_number_of_frames() -> None:
     first = client.run(task_with("delaunay"))
-    denser = replace(task_with("delaunay", kept=first.maps), times=evenly_spaced(5))
+    denser = replace(task_with("delaunay", kept=first.fits), times=evenly_spaced(5))
     found = finish(carry_out(denser)).bake
     assert found is not None
     assert first.bake is not None
     # To rounding: frames are solved a few together.
     np.testing.assert_allclose(found.frames[::2], first.bake.frames, rtol=0.0, atol=1e-12)
-    mesh = from_bytes(first.maps[KEYS], denser.pairs[KEYS]).mesh
+    mesh = from_bytes(first.fits[KEYS], denser.pairs[KEYS]).mesh
     assert len(mesh.tets) > 100

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import live_scrub
-from ..plans import Plan, plan_bake, request_again, write_bake
+from ..bake.plan import Plan, plan_bake, request_again, write_bake
 from ..properties import BakeChoices, bake_request, fill_from_panel
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
 
 if TYPE_CHECKING:
-    from ...solver.task import Outcome
+    from ...solver.frames.task import Outcome
 
 
 class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import jobs
+from ..bake import jobs
 
 
 class QC3D_OT_cancel(bpy.types.Operator):

@@ -11,8 +11,9 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import absolute, keyframing, live_scrub, mirroring, point_cache, removal
-from ..records import Chain, Record
+from .. import live_scrub
+from ..chains import absolute_copy, alembic, keyframes, mirror, remove
+from ..store.records import Chain, Record
 from .common import SLIDER, chosen_chain, poll_chains
 
 _MOST_FRAMES = 100_000
@@ -57,7 +58,7 @@ class QC3D_OT_remove(ChainWork, bpy.types.Operator):
         return poll_chains(cls, context)
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        notes = removal.remove_chain(obj, record, chain)
+        notes = remove.remove_chain(obj, record, chain)
         return [*notes, f"The in-betweens of '{chain.slider}' were removed."]
 
 
@@ -85,7 +86,7 @@ class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
         if not 2 <= len(frames) <= _MOST_FRAMES:
             first, last = self.frame_start, self.frame_end
             raise InputError(f"Frames {first} to {last} are not possible; choose 2 to {_MOST_FRAMES} frames.")
-        notes = keyframing.bake_to_keyframes(context, obj, record, chain, frames)
+        notes = keyframes.bake_to_keyframes(context, obj, record, chain, frames)
         return [*notes, f"The shape keys of '{chain.slider}' have keyframes from {frames[0]} to {frames[-1]}."]
 
 
@@ -102,7 +103,7 @@ class QC3D_OT_absolute_keys(ChainWork, bpy.types.Operator):
         return poll_chains(cls, context)
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        copy = absolute.copy_with_absolute_keys(obj, chain)
+        copy = absolute_copy.copy_with_absolute_keys(obj, chain)
         return [f"'{copy.name}' has {chain.intervals + 1} absolute keys; the slider of '{obj.name}' plays them."]
 
 
@@ -119,7 +120,7 @@ class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
         return poll_chains(cls, context)
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        mirrored = mirroring.mirror_chain(obj, record, chain)
+        mirrored = mirror.mirror_chain(obj, record, chain)
         return [f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
 
 
@@ -151,5 +152,5 @@ class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
         if not self.filepath:
             raise InputError("Name a file to write to.")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".abc"))
-        point_cache.export_alembic(context, obj, chain, path, self.frames)
+        alembic.export_alembic(context, obj, chain, path, self.frames)
         return [f"{path.name} has '{obj.name}' in {self.frames} frames."]

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, ClassVar
 import bpy
 
 from ...solver.errors import QC3DError
-from .. import compat, jobs, preferences, progress
-from ..plans import Plan
+from .. import compat, preferences
+from ..bake import jobs, progress_bar
+from ..bake.plan import Plan
 
 if TYPE_CHECKING:
-    from ...solver.pipeline import Progress
-    from ...solver.task import Outcome
+    from ...solver.frames.task import Outcome
+    from ...solver.support.progress import Progress
 
 _TICK = 0.05  # seconds between looks at the child process
 
@@ -46,11 +47,9 @@ class ChildWork:
             if problem is not None:
                 raise_input(problem)
             plan = self.plan(context)
-            course = jobs.Course(plan.task.new_maps, len(plan.task.times) > 0)
 
             def show(reached: Progress) -> None:
-                course.follow(reached)
-                manager.progress_update(course.fraction)
+                manager.progress_update(reached.overall)
 
             manager.progress_begin(0.0, 1.0)
             try:
@@ -116,10 +115,10 @@ class ChildWork:
         return {'FINISHED'}
 
     def _show(self, context: bpy.types.Context) -> None:
-        shown = (self._job.course.stage, round(self._job.course.fraction, 2), int(self._job.seconds))
+        shown = (self._job.stage, round(self._job.fraction, 2), int(self._job.seconds))
         if shown != getattr(self, "_shown", None):  # drawing takes time from what the user does
             self._shown = shown
-            progress.show(context)
+            progress_bar.show(context)
 
 
 def raise_input(problem: str) -> None:
@@ -131,4 +130,4 @@ def raise_input(problem: str) -> None:
 
 def _leave_window(timer: bpy.types.Timer) -> None:
     bpy.context.window_manager.event_timer_remove(timer)
-    progress.clear()
+    progress_bar.clear()

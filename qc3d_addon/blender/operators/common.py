@@ -8,9 +8,10 @@ import bpy
 from bpy.props import StringProperty
 
 from ...solver.errors import InputError
-from .. import checks, jobs
+from ..bake import jobs
 from ..properties import key_names
-from ..records import Chain, Record
+from ..store import checks
+from ..store.records import Chain, Record
 
 SLIDER = StringProperty(
     name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import bpy
 
-from .. import chain_memory, records
+from ..bake import bookkeeping
+from ..store import records
 from .common import poll_active_object
 
 
@@ -27,6 +28,6 @@ class QC3D_OT_forget_record(bpy.types.Operator):
         return is_damaged
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        chain_memory.forget_all(context.active_object)
+        bookkeeping.forget_all(context.active_object)
         self.report({'INFO'}, "The record is gone; the keys and sliders of earlier bakes are yours now.")
         return {'FINISHED'}

@@ -11,11 +11,12 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import heat_map, legend, slider
-from ..heat_colours import MEASURE_ITEMS
-from ..records import Chain
-from ..shape_keys import owned_keys, slider_owner
-from ..summaries import WorstPlace
+from ..heat_map import heat_map, legend
+from ..heat_map.colors import MEASURE_ITEMS
+from ..keys import slider
+from ..keys.shape_keys import owned_keys, slider_owner
+from ..store.records import Chain
+from ..store.summaries import WorstPlace
 from .common import SLIDER, chosen_chain, poll_chains
 
 

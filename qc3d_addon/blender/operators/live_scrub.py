@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import live_scrub
-from ..plans import Plan, plan_preview
+from ..bake.plan import Plan, plan_preview
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_chains
 
 if TYPE_CHECKING:
-    from ...solver.task import Outcome
+    from ...solver.frames.task import Outcome
 
 
 class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
@@ -43,11 +43,11 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
         return plan_preview(obj, chain)
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        from ...solver.preview import PreviewCurve
+        from ...solver.frames.preview import PreviewCurve
 
         chain = chosen_chain(plan.find_object(), self.slider)
         pairs = len(plan.request.keys) - 1
-        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.settings.easing))
+        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.frame_options.easing))
         return [f"Drag the slider '{chain.slider}': it shows every moment now."]
 
     def _switched_off(self, context: bpy.types.Context) -> set[str] | None:

@@ -11,9 +11,9 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import map_exchange
+from ..bake import map_files
 from ..properties import fill_panel
-from ..records import Chain, Record
+from ..store.records import Chain, Record
 from .chains import ChainWork
 from .common import SLIDER, poll_active_object, poll_chains
 
@@ -44,7 +44,7 @@ class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
         path = _path(self.filepath, "write to")
-        count = map_exchange.save_maps(obj, chain, path)
+        count = map_files.save_maps(obj, chain, path)
         return [f"{path.name} has {'the map' if count == 1 else f'{count} maps'} of '{chain.slider}'."]
 
 
@@ -69,12 +69,12 @@ class QC3D_OT_load_map(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.active_object
         try:
-            loaded = map_exchange.load_maps(obj, _path(self.filepath, "read"))
+            loaded = map_files.load_maps(obj, _path(self.filepath, "read"))
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
         # A map serves bakes with the choices it was made with; the panel shows them from now on.
-        fill_panel(obj.qc3d, loaded.through, loaded.settings)
+        fill_panel(obj.qc3d, loaded.through, loaded.options)
         names = " to ".join(f"'{name}'" for name in loaded.through)
         self.report({'INFO'}, f"The map from {names} is ready; the panel has its choices.")
         return {'FINISHED'}

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..plans import Plan, plan_maps, write_maps
-from ..properties import MapChoices, fill_from_panel, key_names, solver_settings
-from ..requests import BakeRequest
+from ..bake.plan import Plan, plan_maps, write_maps
+from ..bake.request import BakeRequest
+from ..properties import MapChoices, fill_from_panel, fit_options, key_names
 from .child_work import ChildWork
 from .common import poll_active_object, poll_panel_keys
 
 if TYPE_CHECKING:
-    from ...solver.task import Outcome
+    from ...solver.frames.task import Outcome
 
 
 class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):
@@ -31,7 +31,7 @@ class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):
     def plan(self, context: bpy.types.Context) -> Plan:
         obj = context.active_object
         fill_from_panel(self.properties, obj.qc3d)
-        return plan_maps(obj, BakeRequest(key_names(self), 1, solver_settings(self)))
+        return plan_maps(obj, BakeRequest(key_names(self), 1, fit_options(self)))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         write_maps(plan, outcome)

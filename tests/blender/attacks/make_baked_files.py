@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 
 import qc3d_addon
-from qc3d_addon.blender.bake import bake_object
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver import preparation
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.solver.fit import fit_pair
+from qc3d_addon.solver.settings import FrameOptions
 
 from ..conftest import six_tetrahedra
 
@@ -37,10 +37,10 @@ def main() -> None:
         key = obj.shape_key_add(name=name, from_mix=False)
         key.value = 0.0
         key.points.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
-    preparation.fill_cube = lambda *_: six_tetrahedra()  # so that the maps are small
-    settings = Settings(mode="linear")
-    bake_object(obj, BakeRequest(("Basis", "Lean.L"), 3, settings, keyframes=(1, 25)))
-    bake_object(obj, BakeRequest(("Lean.L", "Basis", "Long"), 2, settings))
+    fit_pair.fill_cube = lambda *_: six_tetrahedra()  # so that the maps are small
+    options = FrameOptions(mode="linear")
+    bake_object(obj, BakeRequest(("Basis", "Lean.L"), 3, frame_options=options, keyframes=(1, 25)))
+    bake_object(obj, BakeRequest(("Lean.L", "Basis", "Long"), 2, frame_options=options))
     for operator in (bpy.ops.qc3d.mirror, bpy.ops.qc3d.heat_map, bpy.ops.qc3d.absolute_keys):
         assert operator(slider="Basis→Lean.L") == {'FINISHED'}
     version = ".".join(map(str, bpy.app.version[:2]))

@@ -19,10 +19,11 @@ import bpy
 import pytest
 
 import qc3d_addon
-from qc3d_addon.blender import jobs, live_scrub
-from qc3d_addon.blender.plans import plan_bake
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.settings import Settings
+from qc3d_addon.blender import live_scrub
+from qc3d_addon.blender.bake import jobs
+from qc3d_addon.blender.bake.plan import plan_bake
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.worker.client import Limits
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
@@ -122,9 +123,9 @@ def test_blender_is_ended_while_it_bakes(
 
 def begin(figure: bpy.types.Object) -> int:
     """Start a bake as the button does; the number of the process that does the work."""
-    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 400, Settings(quality="finest")))
+    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 400, FitOptions(quality="finest")))
     job = jobs.begin("Bake In-Betweens", plan.task, Limits())
-    wait_for(lambda: job.poll() or job.course.stage != "Starting", "the first stage")
+    wait_for(lambda: job.poll() or job.stage != "Starting", "the first stage")
     return job._worker._process.pid
 
 

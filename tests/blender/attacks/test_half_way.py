@@ -19,40 +19,33 @@ from typing import Any
 import bpy
 import pytest
 
-from qc3d_addon.blender import (
-    absolute,
-    heat_map,
-    keyframing,
-    live_scrub,
-    map_exchange,
-    mirroring,
-    plans,
-    point_cache,
-    removal,
-    shape_keys,
-    slider,
-)
-from qc3d_addon.blender.plans import Plan, plan_bake, plan_maps, plan_preview
-from qc3d_addon.blender.records import Record
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.pipeline import finish
-from qc3d_addon.solver.preview import PreviewCurve
-from qc3d_addon.solver.task import Outcome, carry_out
+from qc3d_addon.blender import live_scrub
+from qc3d_addon.blender.bake import map_files
+from qc3d_addon.blender.bake import plan as plans
+from qc3d_addon.blender.bake.plan import Plan, plan_bake, plan_maps, plan_preview
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.chains import absolute_copy, alembic, keyframes, mirror, remove
+from qc3d_addon.blender.heat_map import heat_map
+from qc3d_addon.blender.keys import shape_keys, slider
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.frames.preview import PreviewCurve
+from qc3d_addon.solver.frames.task import Outcome, carry_out
+from qc3d_addon.solver.support.progress import finish
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
 State = Callable[[], dict[str, Any]]
-FOLDER = str(Path(plans.__file__).parent)
+FOLDER = str(Path(plans.__file__).parents[1])
 ENDINGS = (
     shape_keys.remove_keys,
     slider.set_keyframes,
     heat_map.hide,
-    keyframing._put_in_place,
-    removal.hide_heat_map,
-    removal.remove_slider,
+    keyframes._put_in_place,
+    remove.hide_heat_map,
+    remove.remove_slider,
     # What an export always does at its end.
-    absolute._remove,
-    point_cache._select,
+    absolute_copy._remove,
+    alembic._select,
 )
 # Blender calls these, and goes on whatever they do.
 HANDLERS = tuple(live_scrub._HANDLERS.values())
@@ -187,31 +180,31 @@ def test_maps(baked: bpy.types.Object, state: State, tmp_path: Path) -> None:
     assert stop_everywhere(lambda: plans.write_maps(plan, outcome), state) > 20
     plans.write_bake(*outcome_of(plan_bake(baked, request("Stretch"))))
     path = tmp_path / "a.qc3dmap"
-    map_exchange.save_maps(baked, chain_of(baked)[1], path)
-    removal.remove_chain(baked, *chain_of(baked))
-    assert stop_everywhere(lambda: map_exchange.load_maps(baked, path), state) > 20
+    map_files.save_maps(baked, chain_of(baked)[1], path)
+    remove.remove_chain(baked, *chain_of(baked))
+    assert stop_everywhere(lambda: map_files.load_maps(baked, path), state) > 20
     assert any(kept.to_key == "Stretch" for kept in Record.read(baked.data.shape_keys).maps)
 
 
 def test_a_mirror_image(baked: bpy.types.Object, state: State) -> None:
-    assert stop_everywhere(lambda: mirroring.mirror_chain(baked, *chain_of(baked)), state) > 50
+    assert stop_everywhere(lambda: mirror.mirror_chain(baked, *chain_of(baked)), state) > 50
     heat_map.show(baked, chain_of(baked)[1], "volume")
-    mirror = Record.read(baked.data.shape_keys)
+    record = Record.read(baked.data.shape_keys)
     baked.data.shape_keys.key_blocks["Basis→Lean 1/3"].points[0].co.z += 0.25
-    assert stop_everywhere(lambda: mirroring.mirror_chain(baked, mirror, mirror.chains[0]), state) > 50
+    assert stop_everywhere(lambda: mirror.mirror_chain(baked, record, record.chains[0]), state) > 50
 
 
 def test_a_copy(baked: bpy.types.Object, state: State) -> None:
     baked.data.materials.append(bpy.data.materials.new("Skin"))
     baked.data.shape_keys.key_blocks["Lean"].keyframe_insert("value", frame=2)
-    assert stop_everywhere(lambda: absolute.copy_with_absolute_keys(baked, chain_of(baked)[1]), state) > 20
+    assert stop_everywhere(lambda: absolute_copy.copy_with_absolute_keys(baked, chain_of(baked)[1]), state) > 20
     assert [obj.name for obj in bpy.data.objects] == ["Even", "Even absolute"]
     assert [mesh.name for mesh in bpy.data.meshes] == ["Even", "Even absolute"]
 
 
 def test_an_export(baked: bpy.types.Object, state: State, tmp_path: Path) -> None:
     def export() -> None:
-        point_cache.export_alembic(bpy.context, baked, chain_of(baked)[1], tmp_path / "a.abc", 3)
+        alembic.export_alembic(bpy.context, baked, chain_of(baked)[1], tmp_path / "a.abc", 3)
 
     before = state()
     assert stop_everywhere(export, state) > 20
@@ -234,7 +227,7 @@ def test_a_heat_map(baked: bpy.types.Object, state: State, is_shown: bool) -> No
 
 def test_keyframes_in_place_of_drivers(baked: bpy.types.Object, state: State) -> None:
     def convert() -> None:
-        keyframing.bake_to_keyframes(bpy.context, baked, *chain_of(baked), range(1, 5))
+        keyframes.bake_to_keyframes(bpy.context, baked, *chain_of(baked), range(1, 5))
 
     assert stop_everywhere(convert, state) > 50
     assert Record.read(baked.data.shape_keys).chains == []
@@ -257,13 +250,13 @@ def test_what_was_stopped_while_it_was_removed_can_be_removed_again(even: bpy.ty
         heat_map.show(even, chain_of(even)[1], "stretch")
         with stopped_at(number, []) as called:
             try:
-                removal.remove_chain(even, *chain_of(even))
+                remove.remove_chain(even, *chain_of(even))
             except Stop:
                 pass
             else:
                 assert len(called) == number - 1
                 break
         if Record.read(even.data.shape_keys).chains:
-            removal.remove_chain(even, *chain_of(even))
+            remove.remove_chain(even, *chain_of(even))
         assert state() == clean, number
     assert number > 100

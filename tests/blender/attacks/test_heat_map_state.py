@@ -12,8 +12,8 @@ from typing import Any
 import bpy
 import pytest
 
-from qc3d_addon.blender import heat_map, legend
-from qc3d_addon.blender.heat_colours import linear
+from qc3d_addon.blender.heat_map import heat_map, legend
+from qc3d_addon.blender.heat_map.colors import linear
 
 from ..test_panel_results import drawn
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import live_scrub
-from qc3d_addon.blender.plans import plan_bake, write_bake
-from qc3d_addon.blender.requests import BakeRequest
-from qc3d_addon.solver.pipeline import finish
-from qc3d_addon.solver.task import carry_out
+from qc3d_addon.blender.bake.plan import plan_bake, write_bake
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.solver.frames.task import carry_out
+from qc3d_addon.solver.support.progress import finish
 
 from ..test_panel_results import drawn
 
@@ -118,7 +118,7 @@ def test_what_is_linked_or_overridden_is_not_written_to(library: Path, state: St
         drawn(obj)
         before = state()
         for name in ("bake_inbetweens", "rebake", "remove", "mirror", "live_scrub", "to_keyframes", "absolute_keys"):
-            with pytest.raises(RuntimeError, match="is linked from a library|is a library override"):
+            with pytest.raises(RuntimeError, match=r"is linked from a library|is a library override"):
                 getattr(bpy.ops.qc3d, name)()
         assert state() == before
 

@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import slider
-from qc3d_addon.blender.names import MAX_STEPS
-from qc3d_addon.blender.records import Record
+from qc3d_addon.blender.keys import slider
+from qc3d_addon.blender.store.names import MAX_STEPS
+from qc3d_addon.blender.store.records import Record
 
 from ..test_panel_results import drawn
 

@@ -13,8 +13,9 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender import compat, live_scrub, shape_keys, slider
-from qc3d_addon.blender.records import Record
+from qc3d_addon.blender import compat, live_scrub
+from qc3d_addon.blender.keys import shape_keys, slider
+from qc3d_addon.blender.store.records import Record
 
 from ..test_panel_results import drawn
 

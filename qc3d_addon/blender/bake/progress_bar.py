@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shows how far the running job is, in the status bar and in the sidebars of the 3D views."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import jobs
+
+
+def draw_bar(layout: bpy.types.UILayout, job: jobs.Job) -> None:
+    """A progress bar with the name of the stage in it."""
+    layout.progress(text=f"{job.stage}, {job.fraction:.0%}", factor=job.fraction, type='BAR')
+
+
+def show(context: bpy.types.Context) -> None:
+    """Draw the status bar and the sidebars anew with what the job has reached."""
+    if context.workspace is not None:
+        context.workspace.status_text_set(_draw_status)
+    _redraw_sidebars()
+
+
+def clear() -> None:
+    """Give the status bar back to Blender, and draw the sidebars anew."""
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):  # only its own status bar is drawn anew
+            window.workspace.status_text_set(None)
+    _redraw_sidebars()
+
+
+def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
+    layout, job = header.layout, jobs.current()
+    if job is not None:
+        layout.label(text=job.label, icon='SHAPEKEY_DATA')
+        bar = layout.row()
+        bar.ui_units_x = 12
+        draw_bar(bar, job)
+        layout.label(text="  Cancel", icon='EVENT_ESC')
+    layout.separator_spacer()
+    layout.template_reports_banner()
+    layout.separator_spacer()
+    layout.template_running_jobs()
+    layout.template_status_info()
+
+
+def _redraw_sidebars() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                for region in area.regions:
+                    if region.type == 'UI':
+                        region.tag_redraw()

@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake is asked for, and what it made."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+from ...solver.errors import InputError
+from ...solver.settings import FitOptions, FrameOptions
+from ..store import names
+from ..store import stored_values as stored
+
+# Frames of every two keys that a tolerance chooses from; it has many divisors.
+DENSE_STEPS = 48
+# Frames of every two keys that a preview is a spline through. It missed the others by at most 6.5e-6 of the size, where
+# benchmarks/scrub.py measured it.
+PREVIEW_STEPS = 24
+
+
+@dataclass(frozen=True)
+class BakeRequest:
+    """What to bake between shape keys of an object.
+
+    Parameters
+    ----------
+    keys
+        Names of two keys or more, from the first to the last; the same name may come again, but not twice in a row.
+    count
+        Number of in-betweens between every two keys that follow each other, evenly spaced.
+    fit_options, frame_options
+        The solver's options.
+    keyframes
+        First and last frame between which the slider goes from 0 to 1, or None to leave it without keyframes.
+    tolerance
+        Where positive, as few in-betweens as show every moment within this distance, in the object's units; ``count``
+        is then not looked at.
+    colliders
+        Name of a collection with objects that the in-betweens must not touch, or empty.
+    """
+
+    keys: tuple[str, ...]
+    count: int = 3
+    fit_options: FitOptions = field(default_factory=FitOptions)
+    frame_options: FrameOptions = field(default_factory=FrameOptions)
+    keyframes: tuple[int, int] | None = None
+    tolerance: float = 0.0
+    colliders: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.keys) < 2:
+            raise InputError("In-betweens need two keys or more.")
+        most = names.MAX_STEPS // (len(self.keys) - 1) - 1
+        if most < 1 or (self.tolerance > 0.0 and most + 1 < DENSE_STEPS):
+            raise InputError(f"{len(self.keys)} keys in a row are too many for one slider; bake them in parts.")
+        if not 1 <= self.count <= most:
+            raise InputError(f"{self.count} in-betweens are not possible; 1 to {most} are.")
+        if not 0.0 <= self.tolerance < float("inf"):
+            raise InputError(f"The tolerance is {self.tolerance}; it must be a distance, or 0 for a fixed number.")
+        if self.keyframes is not None and self.keyframes[0] >= self.keyframes[1]:
+            first, last = self.keyframes
+            raise InputError(f"Keyframes from {first} to {last} are not possible; the last must come after the first.")
+
+    @property
+    def intervals(self) -> int:
+        """Number of steps to compute from the first key to the last."""
+        return (DENSE_STEPS if self.tolerance > 0.0 else self.count + 1) * (len(self.keys) - 1)
+
+    def remembered(self) -> dict[str, Any]:
+        """What another bake of the same keys needs to know, as plain values."""
+        return {
+            "count": self.count,
+            "tolerance": self.tolerance,
+            "settings": asdict(self.fit_options) | asdict(self.frame_options),
+            "colliders": self.colliders,
+        }
+
+    @classmethod
+    def again(cls, keys: tuple[str, ...], remembered: dict[str, Any]) -> BakeRequest:
+        """The request that ``remembered`` came from, its keyframes left as they are.
+
+        Raises
+        ------
+        InputError
+            If it is not what this version writes.
+        """
+        try:
+            options = dict(stored.plain_dict(remembered["settings"]))
+            frame_options = FrameOptions(**{field.name: options.pop(field.name) for field in fields(FrameOptions)})
+            return cls(
+                keys,
+                stored.whole(remembered["count"], 1, names.MAX_STEPS),
+                FitOptions(**options),
+                frame_options,
+                tolerance=stored.number(remembered["tolerance"], 0.0),
+                colliders=stored.text(remembered.get("colliders", "")),
+            )
+        except (KeyError, TypeError, ValueError, InputError) as error:
+            raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What a bake made.
+
+    Parameters
+    ----------
+    slider
+        Name of the custom property that plays the chain.
+    slider_object
+        Name of the object that has it.
+    keys
+        Names of the generated shape keys, from the first key to the last.
+    notes
+        Sentences for the user.
+    report
+        The pipeline's report with the names above: plain values that can be written as JSON.
+    """
+
+    slider: str
+    slider_object: str
+    keys: tuple[str, ...]
+    notes: tuple[str, ...]
+    report: dict[str, Any]
+
+    def summary(self) -> str:
+        """One sentence: what was made and where the slider is."""
+        seconds = sum(self.report["seconds"].values())
+        total = self.report["count"] * (len(self.report["via"]) + 1)
+        return (
+            f"{total} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
+            f"the slider is '{self.slider}' on '{self.slider_object}'."
+        )

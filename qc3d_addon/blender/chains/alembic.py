@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a chain as an Alembic file, written by Blender's own exporter."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import bpy
+
+from ...solver.errors import InputError
+from ...solver.files.npz import replacing
+from .. import compat
+from ..keys import shape_keys, slider
+from ..store.records import Chain
+from .absolute_copy import copied
+
+
+def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
+    """Write the object as its slider goes from 0 to 1 over a number of frames, 1 to ``frames``, modifiers included.
+
+    A temporary copy is animated and exported, so the object and its animation stay as they are.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; what was there is kept.
+    """
+    scene, layer = context.scene, context.view_layer
+    owner = shape_keys.slider_owner(obj, chain)
+    with ExitStack() as undo:
+        undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
+        undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
+        copy = copied(obj, undo)
+        collection = bpy.data.collections.new("QC3D export")
+        undo.callback(bpy.data.collections.remove, collection)
+        scene.collection.children.link(collection)
+        collection.objects.link(copy)
+        copy.animation_data_clear()
+        copy[chain.slider] = 0.0
+        for driver in slider.driven_by(copy.data.shape_keys, chain.slider).values():
+            if driver.variables[0].targets[0].id == owner:
+                driver.variables[0].targets[0].id = copy
+        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
+        slider.set_keyframes(curve, (1, frames))
+        _select(layer, {copy}, copy)
+        with replacing(path) as unfinished:
+            try:
+                result = bpy.ops.wm.alembic_export(
+                    filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
+                )
+            except RuntimeError as error:
+                raise InputError(f"{path} cannot be written: {error}") from error
+            if result != {'FINISHED'} or not unfinished.exists():
+                raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
+
+
+def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:
+    """Let these objects be selected and no others."""
+    for obj in layer.objects:
+        if obj is not None:  # as one that has just been removed
+            obj.select_set(obj in objects, view_layer=layer)
+    layer.objects.active = active

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a slider does over a range of frames, as keyframes of the shape keys themselves."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import compat
+from ..bake import bookkeeping
+from ..keys import shape_keys, slider
+from ..store.records import Chain, Record
+from . import remove
+
+
+def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str, frames: range) -> NDArray[np.float64]:
+    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
+
+    Raises
+    ------
+    InputError
+        If there is no such slider, or it is no number at one of the frames.
+    """
+    scene = context.scene
+    current, part = scene.frame_current, scene.frame_subframe
+    values = []
+    try:
+        for frame in frames:
+            scene.frame_set(frame)
+            evaluated = owner.evaluated_get(context.evaluated_depsgraph_get())
+            slider.require(evaluated, name)
+            values.append(float(evaluated[name]))
+    finally:
+        scene.frame_set(current, subframe=part)
+    return np.array(values)
+
+
+def key_values(chain: Chain, step: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) values of the key at a step where the slider is at ``places`` (k,): what its driver gives."""
+    return np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
+
+
+def bake_to_keyframes(
+    context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain, frames: range
+) -> list[str]:
+    """Give the keys of a chain keyframes in place of drivers, and let them go: they are the animator's own then.
+
+    Returns
+    -------
+    Sentences about what was left because other work depends on it.
+
+    Raises
+    ------
+    InputError
+        If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
+    """
+    keys = obj.data.shape_keys
+    owner = shape_keys.require_removable(obj, chain)
+    shape_keys.require_action(keys)
+    slider.require(owner, chain.slider)
+    places = slider_values(context, owner, chain.slider, frames)
+    owned = shape_keys.owned_keys(keys, chain)
+    notes, animated = [], []
+    with ExitStack() as undo:
+        for step, key in owned.items():
+            curve = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
+            if len(curve.keyframe_points):
+                notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
+            animated.append((key, curve, key_values(chain, step, places)))
+        bookkeeping.forget(keys, record, chain, undo)
+        undo.pop_all()
+    _put_in_place(animated, np.array(frames, dtype=np.float64))
+    remove.hide_heat_map(obj, chain)
+    notes += remove.remove_slider(owner, chain)
+    keys.update_tag()
+    context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+    return notes
+
+
+def _put_in_place(
+    animated: list[tuple[bpy.types.ShapeKey, bpy.types.FCurve, NDArray[np.float64]]], frames: NDArray[np.float64]
+) -> None:
+    """Let curves with these values at ``frames`` do what the drivers of keys did."""
+    for key, curve, values in animated:
+        slider.undrive(key)
+        _set_keyframes(curve, frames, values)
+        key.value = float(values[0])
+
+
+def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Linear keyframes, those left out that lie on the line between their neighbours."""
+    turns = np.ones(len(values), dtype=bool)
+    turns[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2]) > 1e-9
+    frames, values = frames[turns], values[turns]
+    curve.keyframe_points.clear()
+    curve.keyframe_points.add(len(frames))
+    curve.keyframe_points.foreach_set("co", np.column_stack([frames, values]).ravel())
+    linear = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items['LINEAR'].value
+    curve.keyframe_points.foreach_set("interpolation", [linear] * len(frames))
+    curve.update()

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Takes away what bakes made, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import bpy
+
+from .. import compat
+from ..bake import bookkeeping
+from ..heat_map import heat_map
+from ..keys import shape_keys, slider
+from ..store.records import Chain, Record
+
+
+def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+    """Remove a chain with its shape keys, drivers, slider, keyframes, and the maps that no other chain needs.
+
+    Returns
+    -------
+    Sentences about what was left because the animator's own work depends on it.
+
+    Raises
+    ------
+    InputError
+        If a key is locked, or the slider's object or its action is linked; nothing was removed.
+    """
+    owner = shape_keys.require_removable(obj, chain)
+    hide_heat_map(obj, chain)
+    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    notes = remove_slider(owner, chain)
+    with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
+        bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
+        undo.pop_all()
+    return notes
+
+
+def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
+    """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
+    if chain.slider not in owner:
+        return []
+    if slider.problem(owner, chain.slider) is not None:
+        return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
+    readers = sum(1 for curve in _drivers() if slider.reads(curve.driver, owner, chain.slider))
+    if readers:
+        what = "driver reads" if readers == 1 else "drivers read"
+        return [f"The slider '{chain.slider}' stays, since {readers} {what} it."]
+    path = slider.data_path(chain.slider)
+    notes = []
+    if compat.find_fcurve(owner, path) is not None:
+        if chain.keyframes is not None:
+            compat.remove_fcurve(owner, path)
+        else:
+            notes.append(f"The keyframes of '{chain.slider}' stay in the action of '{owner.name}', without effect.")
+    del owner[chain.slider]
+    owner.update_tag()
+    return notes
+
+
+def hide_heat_map(obj: bpy.types.Object, chain: Chain) -> None:
+    """Hide the heat map of a chain, where it is shown."""
+    state = heat_map.shown(obj)
+    if state is not None and state.slider == chain.slider:
+        heat_map.hide(obj)
+
+
+def _drivers() -> Iterator[bpy.types.FCurve]:
+    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
+    for collection in bpy.data.bl_rna.properties:
+        if collection.type != 'COLLECTION':
+            continue
+        for block in getattr(bpy.data, collection.identifier):
+            owner = block.user if isinstance(block, bpy.types.Key) else block
+            if owner is None or not owner.users:
+                continue
+            animation = getattr(block, "animation_data", None)
+            if animation is not None:
+                yield from animation.drivers
+            tree = getattr(block, "node_tree", None)
+            if tree is not None and tree.animation_data is not None:
+                yield from tree.animation_data.drivers

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The heat map of a chain: attributes of each step, and a modifier that blends them as the slider does.
+
+The mesh gets a float attribute for each measure and step, "QC3D stretch 2" for the second step. The modifier's nodes
+write what holds at the slider's position into "QC3D stretch", "QC3D volume" and "QC3D dilatation", which any material
+can read, and the colours of one of them into the colour attribute "QC3D Heat Map", which the viewport shows. Nothing
+of it needs the add-on: it is saved, played and rendered without.
+"""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from typing import Any, NamedTuple
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.errors import InputError
+from .. import compat
+from ..keys import slider
+from ..keys.shape_keys import slider_owner
+from ..store import id_properties, kept_measures
+from ..store import stored_values as stored
+from ..store.kept_measures import MEASURES
+from ..store.records import Chain
+from .colors import Scale, linear, scale_between, scale_of
+
+NAME = "QC3D Heat Map"  # of the modifier, its nodes and the colour attribute
+_STATE = "qc3d_heat_map"
+
+
+class Shown(NamedTuple):
+    """What a heat map shows."""
+
+    slider: str
+    measure: str
+    scale: Scale
+
+
+def shown(obj: bpy.types.Object | None) -> Shown | None:
+    """What an object's heat map shows, None where there is none. Quick enough for a panel."""
+    if obj is None or obj.type != 'MESH' or _modifier(obj) is None:
+        return None
+    state = _state(obj)
+    try:
+        _, low, high, _ = stored.plain_list(state["scale"])
+        scale = scale_between(str(state["measure"]), stored.number(low), stored.number(high))
+        return Shown(stored.name(state["slider"]), str(state["measure"]), scale)
+    except (TypeError, ValueError, KeyError):
+        return None
+
+
+def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
+    """Put the heat map of one measure on the object, in place of another one; where that fails, nothing is changed.
+
+    Raises
+    ------
+    InputError
+        If the bake's measures are not kept or belong to another mesh, or the slider cannot play anything.
+    """
+    mesh = obj.data
+    measures = kept_measures.read(mesh.shape_keys, chain.slider, len(mesh.vertices))
+    if measures is None or len(measures[measure]) != chain.intervals + 1:
+        raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them first.")
+    owner = slider_owner(obj, chain)
+    slider.require(owner, chain.slider)
+    if NAME in obj.modifiers and _modifier(obj) is None:
+        raise InputError(f"'{obj.name}' has another modifier of the name '{NAME}'; rename that first.")
+    scale = scale_of(measure, measures[measure])
+    by_step = {f"QC3D {name} {step}": of_all[step] for name, of_all in measures.items() for step in range(len(of_all))}
+    colour = _active_colour(mesh)
+    if colour == NAME:  # of the one that this one replaces
+        colour = _state(obj).get("active_colour", "")
+    state = {"slider": chain.slider, "measure": measure, "scale": scale, "active_colour": colour}
+    with ExitStack() as undo:
+        undo.callback(_set_active_colour, mesh, _active_colour(mesh))
+        undo.callback(_set_attributes, mesh, _attributes(mesh))
+        _set_attributes(mesh, by_step)
+        mesh.color_attributes.active_color_name = NAME
+        tree = bpy.data.node_groups.new(NAME, 'GeometryNodeTree')
+        undo.callback(bpy.data.node_groups.remove, tree)
+        _make_nodes(tree, measure, scale)
+        _drive(tree, owner, chain)
+        id_properties.put(obj, _STATE, json.dumps(state), undo)
+        modifier = _modifier(obj)
+        if modifier is None:
+            modifier = obj.modifiers.new(NAME, 'NODES')
+            undo.callback(obj.modifiers.remove, modifier)
+            modifier.show_expanded = False
+        before = modifier.node_group
+        undo.callback(setattr, modifier, "node_group", before)
+        modifier.node_group = tree
+        undo.pop_all()
+    if before is not None and before.users == 0:
+        bpy.data.node_groups.remove(before)
+
+
+def refresh(obj: bpy.types.Object, chain: Chain) -> None:
+    """Show what a new bake of the chain measured, where the heat map of that chain is shown."""
+    state = shown(obj)
+    if state is None or state.slider != chain.slider:
+        return
+    if kept_measures.has(obj.data.shape_keys, chain.slider):
+        show(obj, chain, state.measure)
+    else:  # a straight blend has none
+        hide(obj)
+
+
+def hide(obj: bpy.types.Object) -> None:
+    """Remove the heat map and everything that it added."""
+    before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
+    _set_attributes(obj.data, None)
+    _set_active_colour(obj.data, before)
+    if modifier is not None:  # last: for as long as it is there, the heat map is known and can be hidden
+        tree = modifier.node_group
+        obj.modifiers.remove(modifier)
+        if tree is not None and tree.users == 0:
+            bpy.data.node_groups.remove(tree)
+    obj.pop(_STATE, None)
+
+
+def _modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    modifier = obj.modifiers.get(NAME)
+    return modifier if modifier is not None and modifier.type == 'NODES' else None
+
+
+def _state(obj: bpy.types.Object) -> dict[str, Any]:
+    """What ``show`` kept with the object; empty where there is nothing or something else."""
+    try:
+        return stored.parse(obj.get(_STATE))
+    except ValueError:
+        return {}
+
+
+def _active_colour(mesh: bpy.types.Mesh) -> str:
+    return mesh.color_attributes.active_color_name if mesh.color_attributes else ""
+
+
+def _set_active_colour(mesh: bpy.types.Mesh, name: object) -> None:
+    """Let the viewport show this colour attribute, where there is one of that name."""
+    if isinstance(name, str) and name in mesh.color_attributes.keys():  # noqa: SIM118 - fails on half a surrogate pair
+        mesh.color_attributes.active_color_name = name
+
+
+def _attributes(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.float32]] | None:
+    """Values (n,) of the heat map's attributes by name; None where there are none, not even for its colours."""
+    found = {}
+    for attribute in mesh.attributes:
+        if _is_ours(attribute.name) and attribute.name != NAME and attribute.data_type == 'FLOAT':
+            found[attribute.name] = np.empty(len(attribute.data), dtype=np.float32)
+            attribute.data.foreach_get("value", found[attribute.name])
+    return found if found or NAME in mesh.attributes else None
+
+
+def _set_attributes(mesh: bpy.types.Mesh, values: dict[str, NDArray[np.float32]] | None) -> None:
+    """Give the mesh the heat map's attributes with these values (n,), and the one for its colours; None takes all."""
+    for name in [attribute.name for attribute in mesh.attributes if _is_ours(attribute.name)]:
+        mesh.attributes.remove(mesh.attributes[name])
+    if values is None:
+        return
+    for name, at_vertices in values.items():
+        attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
+        attribute.data.foreach_set("value", np.ascontiguousarray(at_vertices))
+    mesh.color_attributes.new(NAME, 'FLOAT_COLOR', 'POINT')
+
+
+def _is_ours(name: str) -> bool:
+    if name == NAME:
+        return True
+    words = name.split(" ")
+    return len(words) == 3 and words[0] == "QC3D" and words[1] in MEASURES and words[2].isdigit()
+
+
+def _make_nodes(tree: bpy.types.NodeTree, measure: str, scale: Scale) -> None:
+    """Nodes that blend the two steps around the slider's position, for every measure, and colour one of them."""
+    tree.is_modifier = True
+    for direction in ('INPUT', 'OUTPUT'):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
+    make, link = tree.nodes.new, tree.links.new
+    along = make('ShaderNodeValue')
+    along.name = along.label = "Slider"
+    step = _math(tree, 'FLOOR', along.outputs[0])
+    part = _math(tree, 'FRACT', along.outputs[0])
+    following = _math(tree, 'ADD', step, 1.0)
+    texts = [_whole_number_text(tree, number) for number in (step, following)]
+    geometry = make('NodeGroupInput').outputs[0]
+    for name in MEASURES:
+        ends = []
+        for text in texts:
+            replace = make('FunctionNodeReplaceString')
+            replace.inputs["String"].default_value = f"QC3D {name} #"
+            replace.inputs["Find"].default_value = "#"
+            link(text, replace.inputs["Replace"])
+            attribute = make('GeometryNodeInputNamedAttribute')
+            attribute.data_type = 'FLOAT'
+            link(replace.outputs[0], attribute.inputs["Name"])
+            ends.append(attribute.outputs[0])
+        # first + part (second - first); after the last step there is none, and the part is 0.
+        difference = _math(tree, 'SUBTRACT', ends[1], ends[0])
+        value = _math(tree, 'ADD', ends[0], _math(tree, 'MULTIPLY', difference, part))
+        geometry = _store(tree, geometry, f"QC3D {name}", 'FLOAT', value)
+        if name == measure:
+            shown_value = value
+    geometry = _store(tree, geometry, NAME, 'FLOAT_COLOR', _colour(tree, shown_value, scale))
+    link(geometry, make('NodeGroupOutput').inputs[0])
+
+
+def _math(
+    tree: bpy.types.NodeTree, operation: str, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket | float = 0.0
+) -> bpy.types.NodeSocket:
+    node = tree.nodes.new('ShaderNodeMath')
+    node.operation = operation
+    tree.links.new(first, node.inputs[0])
+    if isinstance(second, float):
+        node.inputs[1].default_value = second
+    else:
+        tree.links.new(second, node.inputs[1])
+    return node.outputs[0]
+
+
+def _whole_number_text(tree: bpy.types.NodeTree, number: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    node = tree.nodes.new('FunctionNodeValueToString')
+    tree.links.new(number, node.inputs["Value"])
+    node.inputs["Decimals"].default_value = 0
+    return node.outputs[0]
+
+
+def _store(
+    tree: bpy.types.NodeTree,
+    geometry: bpy.types.NodeSocket,
+    name: str,
+    kind: str,
+    value: bpy.types.NodeSocket,
+) -> bpy.types.NodeSocket:
+    node = tree.nodes.new('GeometryNodeStoreNamedAttribute')
+    node.data_type, node.domain = kind, 'POINT'
+    node.inputs["Name"].default_value = name
+    tree.links.new(geometry, node.inputs["Geometry"])
+    tree.links.new(value, next(socket for socket in node.inputs if socket.name == "Value" and socket.enabled))
+    return node.outputs[0]
+
+
+def _colour(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale) -> bpy.types.NodeSocket:
+    place = tree.nodes.new('ShaderNodeMapRange')
+    tree.links.new(_math(tree, 'LOGARITHM', value, float(np.e)), place.inputs["Value"])
+    place.inputs["From Min"].default_value = float(np.log(scale.low))
+    place.inputs["From Max"].default_value = float(np.log(scale.high))
+    ramp = tree.nodes.new('ShaderNodeValToRGB')
+    stops = ramp.color_ramp.elements
+    while len(stops) < len(scale.colours):
+        stops.new(0.5)
+    for number, colour in enumerate(scale.colours):
+        stops[number].position = number / (len(scale.colours) - 1)
+        stops[number].color = (*linear(colour), 1.0)
+    tree.links.new(place.outputs["Result"], ramp.inputs[0])
+    return ramp.outputs[0]
+
+
+def _drive(tree: bpy.types.NodeTree, owner: bpy.types.Object, chain: Chain) -> None:
+    """Let the node "Slider" follow the slider, counted in steps."""
+    curve = compat.new_driver(tree, 'nodes["Slider"].outputs[0].default_value')
+    slider.read_slider(curve.driver, owner, chain.slider)
+    curve.driver.expression = f"min(max({slider.VARIABLE}, 0), 1) * {chain.intervals}"

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the 3D view shows a heat map: its shading, and a legend in the corner."""
+
+from __future__ import annotations
+
+import contextlib
+
+import bpy
+
+from . import heat_map
+from .colors import Scale
+
+_WIDTH, _HEIGHT, _MARGIN, _TEXT = 220, 14, 24, 12  # pixels of a screen of ordinary resolution
+_SHADING = "qc3d_shading"  # what the view showed before, kept with its screen
+
+_handles: list[object] = []
+
+
+def enter(context: bpy.types.Context) -> None:
+    """Let the view, where there is one, show the colours of attributes."""
+    space = context.space_data
+    if space is None or space.type != 'VIEW_3D':
+        return
+    shading = space.shading
+    if (shading.type, shading.color_type) != ('SOLID', 'VERTEX'):
+        context.screen[_SHADING] = [shading.type, shading.color_type]
+    shading.type = 'SOLID'
+    shading.color_type = 'VERTEX'
+
+
+def leave(context: bpy.types.Context) -> None:
+    """Let the view show what it showed before."""
+    space = context.space_data
+    if space is None or space.type != 'VIEW_3D' or _SHADING not in context.screen:
+        return
+    before = context.screen.pop(_SHADING)
+    shading = space.shading
+    shading.type = 'SOLID'
+    with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` kept: the view then stays in Solid
+        kind, colours = before
+        shading.color_type = colours
+        shading.type = kind
+
+
+def register() -> None:
+    """Draw the legend in every 3D view."""
+    if not bpy.app.background:
+        _handles.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_PIXEL'))
+
+
+def unregister() -> None:
+    """Draw it no longer."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), 'WINDOW')
+
+
+def _draw() -> None:
+    state = heat_map.shown(bpy.context.active_object)
+    if state is None or not bpy.context.space_data.overlay.show_overlays:
+        return
+    scale = state.scale
+    size = bpy.context.preferences.system.ui_scale
+    _draw_bar(scale, size)
+    _draw_texts(scale, size)
+
+
+def _draw_bar(scale: Scale, size: float) -> None:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    left, bottom = _MARGIN * size, (_MARGIN + _TEXT * 1.5) * size
+    last = len(scale.colours) - 1
+    corners, colours = [], []
+    for number, colour in enumerate(scale.colours):
+        x = left + _WIDTH * size * number / last
+        corners += [(x, bottom), (x, bottom + _HEIGHT * size)]
+        colours += [(*colour, 1.0)] * 2
+    shader = gpu.shader.from_builtin('SMOOTH_COLOR')
+    batch_for_shader(shader, 'TRI_STRIP', {"pos": corners, "color": colours}).draw(shader)
+
+
+def _draw_texts(scale: Scale, size: float) -> None:
+    import blf
+
+    font = 0
+    blf.size(font, _TEXT * size)
+    blf.color(font, 0.95, 0.95, 0.95, 1.0)
+    blf.enable(font, blf.SHADOW)
+    blf.shadow(font, 3, 0.0, 0.0, 0.0, 0.8)
+    texts = [(_MARGIN + place * _WIDTH, _MARGIN, text, place) for place, text in scale.ticks]
+    texts.append((_MARGIN, _MARGIN + _TEXT * 1.5 + _HEIGHT + 6, scale.title, 0.0))
+    for x, y, text, part in texts:
+        width, _ = blf.dimensions(font, text)
+        blf.position(font, x * size - part * width, y * size, 0.0)
+        blf.draw(font, text)
+    blf.disable(font, blf.SHADOW)

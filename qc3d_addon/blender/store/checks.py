@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether an object can be baked at all, and the sentence to say where it cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import bpy
+
+from ...solver.errors import InputError
+from . import records
+from .records import Chain
+
+
+def object_problem(obj: bpy.types.Object | None) -> str | None:
+    """Why nothing can be baked on ``obj``, or None. Quick enough for a button that is drawn all the time."""
+    if obj is None:
+        return "There is no active object; select a mesh with shape keys."
+    if obj.type != 'MESH':
+        return f"'{obj.name}' is not a mesh; select a mesh with shape keys."
+    mesh, keys = obj.data, obj.data.shape_keys
+    for block in (obj, mesh, keys):
+        if block is None:
+            continue
+        if block.library is not None:
+            return f"'{block.name}' is linked from a library and cannot be changed; make it local first."
+        if block.override_library is not None:
+            return f"'{block.name}' is a library override and cannot take new shape keys; make it local first."
+    if obj.mode != 'OBJECT' or mesh.is_editmode:
+        return f"'{obj.name}' is being edited; go back to Object Mode first."
+    if mesh.users > 1:
+        other = next((other for other in bpy.data.objects if other.data == mesh and other.mode != 'OBJECT'), None)
+        if other is not None:
+            return f"'{other.name}', which shares its mesh, is being edited; go back to Object Mode first."
+    if keys is None or len(keys.key_blocks) < 2:
+        return f"'{obj.name}' has fewer than two shape keys; add a second one to go to."
+    if not keys.use_relative:
+        return f"The shape keys of '{obj.name}' are absolute; switch on Relative, which the slider needs."
+    return None
+
+
+def require_object(obj: bpy.types.Object | None) -> bpy.types.Object:
+    """``obj`` itself where it can be baked; raises InputError where it cannot."""
+    problem = object_problem(obj)
+    if problem is not None:
+        raise InputError(problem)
+    assert obj is not None
+    return obj
+
+
+def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
+    """Why names, from the first key to the last, are not shape keys of ``keys`` to go through, or None."""
+    for number, name in enumerate(names):
+        which = _which(number, len(names))
+        if not name:
+            return f"Choose {which}."
+        if name not in keys.key_blocks:
+            return f"There is no shape key '{name}'; choose {which} from those of the mesh."
+    for name, following in pairwise(names):
+        if name == following and len(names) == 2:
+            return f"'{name}' is both the first and the second key; choose two different keys."
+        if name == following:
+            return f"'{name}' comes twice in a row; choose different keys one after the other."
+    return None
+
+
+def chain_problem(keys: bpy.types.Key, chain: Chain) -> str | None:
+    """Why a chain cannot be made again, or None: the keys that it goes through are not all there."""
+    lost = next((name for name in chain.through if name not in keys.key_blocks), None)
+    if lost is None:
+        return None
+    if chain.mirror_of:
+        return f"'{chain.slider}' is the mirror image of '{chain.mirror_of}'; mirror that one again."
+    return f"Shape key '{lost}' was renamed or deleted; give it its name back to re-bake, or bake anew."
+
+
+def chains_problem(obj: bpy.types.Object) -> str | None:
+    """Why ``obj`` has no in-betweens to work on, or None. Quick enough for a button that is drawn all the time."""
+    state = records.state(obj.data.shape_keys)
+    if state.problem is None and not state.chains:
+        return f"'{obj.name}' has no in-betweens yet; bake some first."
+    return state.problem
+
+
+def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:
+    """Raise InputError unless the names are shape keys of ``keys`` to go through."""
+    problem = keys_problem(keys, names)
+    if problem is not None:
+        raise InputError(problem)
+
+
+def _which(number: int, count: int) -> str:
+    if number == 0:
+        return "the first key"
+    if number == count - 1:
+        return "the second key" if count == 2 else "the last key"
+    return f"inner key {number}"

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's mesh data as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.errors import InputError
+from . import checks
+
+if TYPE_CHECKING:
+    from ...solver.keys.keypair import Ends, KeyPair
+
+
+def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPair]:
+    """The pairs of shape keys that follow each other in ``names``, checked, by their names.
+
+    Raises
+    ------
+    InputError
+        If they are not shape keys of the mesh, or their coordinates cannot be used.
+    """
+    from ...solver.keys.keypair import consecutive_pairs
+
+    checks.require_keys(obj.data.shape_keys, names)
+    coordinates = {name: key_coordinates(obj, name) for name in names}
+    return consecutive_pairs(coordinates, triangles(obj.data), wire_edges(obj.data), names)
+
+
+def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
+    """(n, 3) float32: the absolute positions that a shape key of the object's mesh holds.
+
+    Raises
+    ------
+    InputError
+        If the key holds another number of points than the mesh has vertices.
+    """
+    mesh = obj.data
+    points = mesh.shape_keys.key_blocks[name].points
+    if len(points) != len(mesh.vertices):
+        raise InputError(
+            f"Shape key '{name}' has {len(points)} points but the mesh has {len(mesh.vertices)} vertices; "
+            "enter and leave Edit Mode once to bring them together."
+        )
+    coordinates = np.empty(3 * len(points), dtype=np.float32)
+    points.foreach_get("co", coordinates)
+    return coordinates.reshape(-1, 3)
+
+
+def set_key_coordinates(key: bpy.types.ShapeKey, coordinates: NDArray[np.float32]) -> None:
+    """Replace the positions of a shape key by an (n, 3) float32 array, bit for bit."""
+    key.points.foreach_set("co", np.ascontiguousarray(coordinates, dtype=np.float32).ravel())
+
+
+def triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(m, 3): the mesh's faces as Blender triangulates them."""
+    mesh.calc_loop_triangles()
+    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    return corners.reshape(-1, 3)
+
+
+def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(e, 2): the edges that belong to no face."""
+    ends = np.empty(2 * len(mesh.edges), dtype=np.int32)
+    mesh.edges.foreach_get("vertices", ends)
+    edge_of_corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("edge_index", edge_of_corner)
+    is_wire = np.ones(len(mesh.edges), dtype=bool)
+    is_wire[edge_of_corner] = False
+    return ends.reshape(-1, 2)[is_wire]

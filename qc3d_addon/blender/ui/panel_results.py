@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sub-panel below the choices: each slider with what its bake made."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...solver.errors import InputError
+from .. import live_scrub
+from ..heat_map import heat_map
+from ..keys import shape_keys, slider
+from ..operators.bake_inbetweens import QC3D_OT_rebake
+from ..operators.chains import (
+    QC3D_OT_absolute_keys,
+    QC3D_OT_export_alembic,
+    QC3D_OT_mirror,
+    QC3D_OT_remove,
+    QC3D_OT_to_keyframes,
+)
+from ..operators.forget_record import QC3D_OT_forget_record
+from ..operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
+from ..operators.live_scrub import QC3D_OT_live_scrub
+from ..operators.map_files import QC3D_OT_save_map
+from ..store import checks, kept_measures, records
+from ..store.records import Chain, Record
+from ..store.summaries import Summary
+from .panel_texts import draw_sentence
+from .panels import QC3D_PT_inbetweens
+
+_MORE = (
+    (QC3D_OT_mirror, 'MOD_MIRROR'),
+    (QC3D_OT_to_keyframes, 'KEYFRAME'),
+    (QC3D_OT_absolute_keys, 'DUPLICATE'),
+    (QC3D_OT_export_alembic, 'EXPORT'),
+    (QC3D_OT_save_map, 'FILE_TICK'),
+    (QC3D_OT_remove, 'TRASH'),
+)
+_STOPPED = "Blender stopped the drivers, since the slider had no value for a moment; re-bake to start them again."
+_PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
+
+
+class QC3D_PT_results(bpy.types.Panel):
+    """The sliders of the active object's in-betweens, the newest first."""
+
+    bl_label = "Baked In-Betweens"
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "QC3D"
+    bl_parent_id = QC3D_PT_inbetweens.__name__
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        obj = context.active_object
+        if obj is None or obj.type != 'MESH' or obj.data.shape_keys is None:
+            return False
+        state = records.state(obj.data.shape_keys)
+        return state.chains > 0 or state.problem is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        obj = context.active_object
+        try:
+            chains = Record.read(obj.data.shape_keys).chains
+        except InputError as error:
+            draw_sentence(context, self.layout, str(error), 'ERROR')
+            if records.state(obj.data.shape_keys).is_damaged:
+                self.layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
+            return
+        for chain in reversed(chains):
+            _draw_chain(context, self.layout.box(), obj, chain)
+
+
+def _draw_chain(
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
+) -> None:
+    owner = shape_keys.slider_owner(obj, chain)
+    slider_problem = slider.problem(owner, chain.slider)
+    if slider_problem is None:
+        layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
+    else:
+        draw_sentence(context, layout, slider_problem, 'ERROR')
+    if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+        draw_sentence(context, layout, _STOPPED, 'ERROR')
+    problem = checks.chain_problem(obj.data.shape_keys, chain)
+    buttons = layout.row(align=True)
+    if problem is not None and chain.mirror_of:  # it has no keys of its own to be made from
+        buttons.operator(QC3D_OT_mirror.bl_idname, text="Mirror Again", icon='MOD_MIRROR').slider = chain.mirror_of
+    else:
+        buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
+        is_on = live_scrub.is_on(obj, chain.slider)
+        buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
+        if problem is not None:
+            draw_sentence(context, layout, problem, 'ERROR')
+    if chain.result is not None:
+        _draw_result(context, layout, chain, chain.result)
+        _draw_distortion(layout, obj, chain)
+        for note in chain.result.notes:
+            draw_sentence(context, layout, note)
+    header, more = layout.panel(f"QC3D_more_{chain.slider}", default_closed=True)
+    header.label(text="More")
+    if more is not None:
+        column = more.column(align=True)
+        for operator, icon in _MORE[1:] if chain.mirror_of else _MORE:
+            column.operator(operator.bl_idname, icon=icon).slider = chain.slider
+
+
+def _draw_result(
+    context: bpy.types.Context, layout: bpy.types.UILayout, chain: Chain, result: Summary
+) -> None:
+    facts = layout.column(align=True)
+    facts.scale_y = 0.8
+    if chain.mirror_of:
+        draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
+    seconds = "" if chain.mirror_of else f" in {result.seconds:.1f} s"
+    facts.label(text=f"{result.count} in-betweens{seconds}")
+    counts = {what: count for name, what in _PROBLEMS.items() if (count := getattr(result, name)) is not None}
+    problems = [f"{count} {what}" for what, count in counts.items() if count]
+    facts.label(
+        text=", ".join(problems) or f"No {', no '.join(counts)}",
+        icon='ERROR' if problems else 'CHECKMARK',
+    )
+    if result.residual is None:
+        facts.label(text="Straight blend, without a map")
+    else:
+        facts.label(text=f"Fitted within {result.residual:.2%} of the size")
+        facts.label(text=f"Engine {result.engine}")
+
+
+def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain) -> None:
+    worst = None if chain.result is None else chain.result.worst
+    if worst is not None:
+        row = layout.row(align=True)
+        row.label(text=f"Worst stretch +{worst.excess:.1%} at {worst.at:.2f}")
+        row.operator(QC3D_OT_select_worst.bl_idname, text="", icon='RESTRICT_SELECT_OFF').slider = chain.slider
+    if kept_measures.has(obj.data.shape_keys, chain.slider):
+        state = heat_map.shown(obj)
+        row = layout.row(align=True)
+        row.prop(obj.qc3d, "measure", text="")
+        is_shown = state is not None and (state.slider, state.measure) == (chain.slider, obj.qc3d.measure)
+        button = row.operator(QC3D_OT_heat_map.bl_idname, icon='SHADING_RENDERED', depress=is_shown)
+        button.slider, button.measure = chain.slider, obj.qc3d.measure

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel in the 3D view's sidebar: the choices, the button, and how far the work is."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...worker import engines
+from ..bake import jobs, progress_bar
+from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from ..operators.cancel import QC3D_OT_cancel
+from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
+from ..operators.map_files import QC3D_OT_load_map
+from ..operators.prepare import QC3D_OT_prepare
+from ..properties import ObjectSettings, key_names
+from ..store import checks, records
+from . import presets
+from .panel_texts import draw_sentence
+
+# Else Blender asks the operators whether they can run as if the mouse were over the 3D view, not over this panel.
+IN_THE_SIDEBAR = 'INVOKE_DEFAULT'
+
+
+class QC3D_PT_inbetweens(bpy.types.Panel):
+    """The keys, the number of in-betweens, and the button."""
+
+    bl_label = "QC3D"
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "QC3D"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        obj = context.active_object
+        problem = checks.object_problem(obj)
+        if problem is None:
+            _draw_choices(layout, obj)
+            problem = checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d))
+        job = jobs.current()
+        if job is not None:
+            _draw_job(layout, job)
+            return
+        button = layout.column()
+        button.operator_context = IN_THE_SIDEBAR
+        button.scale_y = 1.4
+        button.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
+        if problem is not None:
+            draw_sentence(context, layout, problem)
+            return
+        notice = engines.engine_notice() if obj.qc3d.engine != 'delaunay' else None
+        if notice is not None and not records.state(obj.data.shape_keys).chains:  # else it is said with what was baked
+            draw_sentence(context, layout, notice)
+
+
+def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    settings = obj.qc3d
+    presets.draw(layout)
+    _draw_keys(layout, settings, obj.data.shape_keys)
+    amount = layout.column(align=True)
+    amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
+    amount.prop(settings, "use_tolerance")
+    look = layout.column()
+    look.prop(settings, "mode")
+    look.row().prop(settings, "quality", expand=True)
+    look.prop_search(settings, "colliders", bpy.data, "collections")
+    frames = layout.column(align=True)
+    frames.prop(settings, "use_keyframes")
+    if settings.use_keyframes:
+        frames.prop(settings, "frame_start")
+        frames.prop(settings, "frame_end")
+    header, advanced = layout.panel("QC3D_advanced", default_closed=True)
+    header.label(text="Advanced")
+    if advanced is not None:
+        choices = advanced.column()
+        for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
+            choices.prop(settings, name)
+        advanced.operator_context = IN_THE_SIDEBAR
+        row = advanced.row(align=True)
+        row.operator(QC3D_OT_prepare.bl_idname)
+        row.operator(QC3D_OT_load_map.bl_idname)
+
+
+def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.types.Key) -> None:
+    """A row for each key, in the order in which they are gone through."""
+    column = layout.column()
+    column.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    for index, inner in enumerate(settings.via):
+        row = column.row(align=True)
+        row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
+        row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
+    column.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    column.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
+
+
+def _draw_job(layout: bpy.types.UILayout, job: jobs.Job) -> None:
+    column = layout.column()
+    column.label(text=f"{job.label}, {job.seconds:.0f} s")
+    progress_bar.draw_bar(column, job)
+    column.operator(QC3D_OT_cancel.bl_idname, icon='CANCEL')

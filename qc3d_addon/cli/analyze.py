@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``qc3d analyze``: how much a mapping distorts, in figures, arrays and pictures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..solver.errors import InputError
+from ..solver.files.npz import replacing_all
+from ..solver.fit.fit_pair import fit_pair
+from ..solver.frames.measures import VertexMeasures
+from ..solver.keys.files import read_pair
+from ..solver.maps.analysis import Analysis
+from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
+from ..solver.maps.mapping import Mapping
+from ..solver.settings import FitOptions
+from ..solver.support.progress import finish
+from .options import add_options, fit_options
+from .progress_bars import StageBars
+
+if TYPE_CHECKING:
+    from ..solver.fit.fitted_map import FittedMap
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the others."""
+    command = commands.add_parser("analyze", help="how much the map between two shapes, or of a mesh, distorts")
+    command.add_argument(
+        "input",
+        type=Path,
+        metavar="FILE",
+        help="with --from and --to: shapes as for interpolate, whose map is fitted first; else tetrahedra with the "
+        "array 'target': .npz, .vtu, .vtk, .msh",
+    )
+    command.add_argument("--from", dest="first", metavar="NAME", help="the first of two shapes")
+    command.add_argument("--to", dest="last", metavar="NAME", help="the second")
+    command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
+    command.add_argument("--format", choices=("npz", "vtu", "vtk", "msh"), default="npz", help="of mapping.* (npz)")
+    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
+    add_options(command, FitOptions)
+    command.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    if find_spec("matplotlib") is None:
+        raise InputError("The pictures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
+    fitted = None
+    if (arguments.first is None) != (arguments.last is None):
+        raise InputError("Two shapes are needed; give both --from and --to, or neither for a mesh of tetrahedra.")
+    if arguments.first is not None:
+        if arguments.target is not None:
+            raise InputError("--target belongs to meshes of tetrahedra; leave it out, or --from and --to.")
+        pair = read_pair(arguments.input, arguments.first, arguments.last)
+        with StageBars() as bars:
+            fitted = finish(fit_pair(pair, fit_options(arguments)), bars)
+        mapping = Mapping(fitted.mesh, fitted.mapped)
+    else:
+        mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
+    analysis = Analysis(mapping)
+    with _folder(arguments.output):
+        _write(analysis, fitted, arguments.output, arguments.format)
+
+
+@contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """Make a folder where there is none; leaving by an error removes it again."""
+    is_new = not path.exists()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path} cannot be made a folder: {error.strerror or error}.") from error
+    try:
+        yield
+    except BaseException:
+        if is_new:
+            with suppress(OSError):
+                path.rmdir()
+        raise
+
+
+def _write(analysis: Analysis, fitted: FittedMap | None, folder: Path, ending: str) -> None:
+    from qc3d_paper.drawing.slices import save_histograms, save_slices
+    from qc3d_paper.drawing.surfaces import save_distortion
+
+    summary = analysis.summary()
+    names = [f"mapping.{ending}", "histograms.png", "slices.png", "summary.json"]
+    names += [] if fitted is None else ["surface.npz", "surface.png"]
+    with replacing_all(*(folder / name for name in names)) as (mapping, histograms, slices, text, *surface):
+        write_tets(mapping, _with_attributes(analysis))
+        try:
+            save_histograms(analysis, histograms)
+            save_slices(analysis, slices)
+            if fitted is not None:
+                pair = fitted.pair
+                measures = VertexMeasures([fitted]).of(0, pair.key1, fitted.mapped)
+                summary["surface"] = {
+                    "vertices": len(pair.key0),
+                    "landmark_residual": asdict(fitted.landmark_residual()),
+                    **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
+                }
+                arrays: dict[str, Any] = dict(measures)
+                with surface[0].open("wb") as file:
+                    np.savez_compressed(file, faces=pair.faces, key0=pair.key0, key1=pair.key1, **arrays)
+                save_distortion(pair, measures, surface[1])
+            text.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{folder} cannot be written to: {error.strerror or error}; nothing was.") from error
+
+
+def _with_attributes(analysis: Analysis) -> TetFile:
+    mapping = analysis.mapping
+    return TetFile(
+        mapping.mesh.points,
+        mapping.mesh.tets,
+        {TARGET: mapping.values, **{f"{name}_at_vertices": v for name, v in analysis.at_vertices().items()}},
+        {
+            STRETCH: analysis.upper_triangle,
+            EIGEN_FORM: analysis.eigen_form,
+            "directions": analysis.directions.reshape(-1, 9),
+            **analysis.measures,
+        },
+    )

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``qc3d interpolate``: in-betweens of shapes in an .npz file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..solver.errors import InputError
+from ..solver.files.npz import replacing_all
+from ..solver.frames.bake import evenly_spaced
+from ..solver.frames.files import write_frames
+from ..solver.frames.task import Task, carry_out
+from ..solver.keys.files import read_pairs
+from ..solver.settings import FitOptions, FrameOptions
+from ..solver.support.memory import machine_limit_mb
+from ..solver.support.progress import finish
+from .options import (
+    add_keys,
+    add_options,
+    fit_options,
+    frame_options,
+    key_names,
+    print_notes,
+    require_distinct_files,
+    write_json,
+)
+from .progress_bars import StageBars
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the others."""
+    command = commands.add_parser("interpolate", help="in-betweens of shapes in an .npz file")
+    command.add_argument(
+        "pair", type=Path, metavar="PAIR.npz", help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3)"
+    )
+    add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1")
+    add_options(command, FrameOptions, FitOptions)
+    command.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    require_distinct_files(arguments.pair, arguments.output, arguments.report)
+    names = key_names(arguments)
+    pairs = read_pairs(arguments.pair, names)
+    times = evenly_spaced((arguments.frames + 1) * (len(names) - 1) - 1)
+    task = Task(pairs, names, fit_options(arguments), frame_options(arguments), times)
+    task.require_memory(machine_limit_mb())
+    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    with replacing_all(*files) as (output, *reports):
+        with StageBars() as bars:
+            bake = finish(carry_out(task), bars).bake
+        assert bake is not None
+        try:
+            write_frames(output, list(pairs.values()), bake.times, bake.frames)
+            for report in reports:
+                write_json(report, bake.report.as_json())
+        except OSError as error:
+            raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
+    print_notes(bake.report.notes)

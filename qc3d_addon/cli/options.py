@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options and checks that several commands have."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+from ..solver.errors import InputError, on_one_line
+from ..solver.settings import FitOptions, FrameOptions
+
+MOST_FRAMES = 10_000
+_HELP = {
+    "mode": "how in-betweens are made",
+    "easing": "how far along the way the in-betweens are",
+    "stretch": "how mode natural interpolates stretches",
+    "engine": "what fills the volume around the mesh",
+    "quality": "how fine the volume is",
+    "extra_turns": "full turns that two shapes cannot tell",
+    "seed": "of the delaunay engine's samples",
+}
+_METAVARS = {"extra_turns": "TURNS", "seed": "S"}
+
+
+def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions]) -> None:
+    """Add the solver's options: those of the fit, of the frames, or both."""
+    for kind in kinds:
+        defaults, types = kind(), get_type_hints(kind)
+        for name in types:
+            if name not in _HELP:
+                continue
+            default, choices = getattr(defaults, name), get_args(types[name])
+            command.add_argument(
+                f"--{name.replace('_', '-')}",
+                default=default,
+                help=f"{_HELP[name]} (default: {default})",
+                **({"choices": choices} if choices else {"type": whole_number, "metavar": _METAVARS[name]}),
+            )
+
+
+def fit_options(arguments: argparse.Namespace) -> FitOptions:
+    """The options of the fit that were chosen; the others stay at their defaults."""
+    return FitOptions(**_chosen(arguments, FitOptions))
+
+
+def frame_options(arguments: argparse.Namespace) -> FrameOptions:
+    """The options of the frames that were chosen."""
+    return FrameOptions(**_chosen(arguments, FrameOptions))
+
+
+def _chosen(arguments: argparse.Namespace, kind: type[FitOptions | FrameOptions]) -> dict[str, Any]:
+    return {name: getattr(arguments, name) for name in get_type_hints(kind) if hasattr(arguments, name)}
+
+
+def add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents: str) -> None:
+    """Add the keys to go through, the number of in-betweens, and where results go."""
+    command.add_argument("--from", dest="first", required=True, metavar="NAME", help=f"the {kind} to start from")
+    command.add_argument(
+        "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; once for each, in order"
+    )
+    command.add_argument("--to", dest="last", required=True, metavar="NAME", help=f"the {kind} to end with")
+    command.add_argument(
+        "--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens between every two"
+    )
+    command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
+    command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
+
+
+def key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """The keys of ``add_keys`` from the first to the last."""
+    return (arguments.first, *arguments.via, arguments.last)
+
+
+def require_distinct_files(*paths: Path | None) -> None:
+    """Raise InputError where two of the paths are one file."""
+    seen: dict[Path, Path] = {}
+    for path in paths:
+        if path is not None and seen.setdefault(path.resolve(), path) is not path:
+            raise InputError(f"{path} is named twice; input, output and report must be different files.")
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print sentences for the user on standard error."""
+    for note in notes:
+        print(f"qc3d: {on_one_line(note)}", file=sys.stderr)
+
+
+def write_json(path: Path, values: dict[str, Any]) -> None:
+    """Write a report; raises OSError if it cannot be written."""
+    path.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+
+
+def whole_number(text: str) -> int:
+    """A whole number; for argparse."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
+def _frame_count(text: str) -> int:
+    count = whole_number(text)
+    if not 0 <= count <= MOST_FRAMES:
+        raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")
+    return count

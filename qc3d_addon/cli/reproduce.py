@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``qc3d reproduce``: the paper's experiments, drawn, measured, and held against what it claims."""
+
+from __future__ import annotations
+
+import argparse
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..solver.errors import InputError
+from ..solver.files.npz import replacing
+from ..solver.maps.mapping import Mapping
+
+if TYPE_CHECKING:
+    from qc3d_paper.experiments.caption import Caption
+    from qc3d_paper.experiments.spectra import Experiment
+
+    from ..solver.tets.mesh import TetMesh
+
+NUMBERS = tuple(range(3, 14))
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the others."""
+    command = commands.add_parser("reproduce", help="the experiments of the paper that the method is from")
+    command.add_argument(
+        "--figure", type=int, choices=NUMBERS, action="append", metavar="N", help="3 to 13; all where left out"
+    )
+    command.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="real shapes: head.npz and body.npz in place of the demo files"
+    )
+    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
+    command.set_defaults(run=_run)
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    if find_spec("matplotlib") is None:
+        raise InputError("The figures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
+    try:
+        arguments.output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{arguments.output} cannot be made a folder: {error.strerror or error}.") from error
+    texts = []
+    for number in sorted(set(arguments.figure or NUMBERS)):
+        picture = arguments.output / f"figure{number}.png"
+        with replacing(picture) as unfinished:
+            caption = _draw(number, arguments.data, unfinished)
+        texts.append(caption.text(picture))
+        print(f"Figure {number}: {caption.holds}")
+    with replacing(arguments.output / "figures.md") as unfinished:
+        unfinished.write_text("# The paper's figures, made again\n\n" + "\n".join(texts), encoding="utf-8")
+
+
+def _draw(number: int, data: Path | None, path: Path) -> Caption:
+    from qc3d_paper.experiments import bijections, sequences, shapes, spectra
+
+    if number <= 5:
+        return bijections.draw(str(number), *_bijection(str(number), data), path)
+    if number <= 7:
+        known = {6: (shapes.FACES, shapes.DATA_FACES), 7: (shapes.BODIES, shapes.DATA_BODIES)}
+        return sequences.draw(str(number), known[number][data is not None], data, path)
+    which, kind = divmod(number - 8, 3)
+    draw = (spectra.draw_cubes, spectra.draw_spectrum, spectra.draw_errors)[kind]
+    return draw(str(number), _experiment(which, data), path)
+
+
+def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:
+    """What a figure is called and the map it rebuilds: from a formula, or one fitted to real shapes."""
+    from qc3d_paper.experiments import bijections, shapes
+
+    if data is None:
+        title, formula = bijections.BIJECTIONS[number]
+        return bijections.without_folds(_cube(), title, formula)
+    pose = (shapes.DATA_FACES[1], shapes.DATA_BODIES[0], shapes.DATA_BODIES[2])[int(number) - 3]
+    fitted = shapes.fitted(shapes.read(pose, data))
+    return f"the map of {pose.label}", Mapping(fitted.mesh, fitted.mapped)
+
+
+@cache
+def _cube() -> TetMesh:
+    from qc3d_paper.experiments import shapes
+
+    return shapes.cube()
+
+
+@cache
+def _experiment(which: int, data: Path | None) -> Experiment:
+    """The first map is mild, a face, the second extreme, a body."""
+    from qc3d_paper.experiments import shapes, spectra
+
+    mild, extreme = (shapes.FACES, shapes.BODIES) if data is None else (shapes.DATA_FACES, shapes.DATA_BODIES)
+    return spectra.Experiment((mild[1], extreme[2])[which], data)

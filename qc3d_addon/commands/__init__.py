@@ -1,3 +1,0 @@
-# SPDX-FileCopyrightText: 2026 QC3D authors
-# SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands of ``qc3d``, a module each."""

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A tree of boxes around the triangles of a moving surface: built once, fitted to every shape."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..triangles.topology import among, distinct
+
+# So many pairs of boxes are compared at once.
+_CHUNK = 2_000_000
+# Pairs around a vertex grow with the square of its triangles; beyond this they are not listed, but met on the way.
+_MOST_AROUND_A_VERTEX = 64
+
+Pairs = tuple[Ints, Ints]
+Values = TypeVar("Values", Floats, Bools)
+
+
+class TriangleTree:
+    """Pairs of triangles whose boxes meet, most of those that share a vertex left out.
+
+    A binary tree, full but for the end of each level: the nodes of a level are numbered from 0, and the children of
+    node i are 2i and 2i + 1. Boxes are fitted to a shape from the leaves up (van den Bergen 1997, "Efficient collision
+    detection of complex deformable models using AABB trees"). The boxes of nodes that have a vertex in common always
+    meet, whatever the shape: that much of every search is known beforehand. What is compared for a shape are pairs of
+    nodes that have none, while their parents have; and whatever is below pairs that meet.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+    shapes : sequence of (n, 3)
+        Triangles that are near each other in all of these share a branch.
+    moving : (m,) bool
+        Only pairs are looked for of which at least one triangle is among these.
+
+    Attributes
+    ----------
+    order : (m,) int64
+        The triangle at each leaf.
+    """
+
+    def __init__(self, faces: Ints, shapes: Sequence[Floats], moving: Bools) -> None:
+        self.order = halving_order(np.concatenate([shape[faces].mean(axis=1).T for shape in shapes]))
+        self._moves = [moving[self.order]]
+        touching = self._concerned(_around_vertices(faces[self.order]), self._moves[0])
+        self._apart: list[Pairs] = []
+        while len(self._moves[0]) > 1:
+            count = len(self._moves[0])
+            self._moves.insert(0, _joined(self._moves[0], np.logical_or, False))
+            above = _unique(touching[0] // 2, touching[1] // 2, len(self._moves[0]))
+            self._apart.insert(0, self._concerned(_without(_children(above, count), touching, count), self._moves[1]))
+            touching = above
+
+    @staticmethod
+    def _concerned(pairs: Pairs, moves: Bools) -> Pairs:
+        concerned = moves[pairs[0]] | moves[pairs[1]]
+        return pairs[0][concerned], pairs[1][concerned]
+
+    def meeting(self, low: Floats, high: Floats) -> Iterator[Pairs]:
+        """Pairs of leaves, the smaller first, whose boxes (3, m), in the order of the leaves, meet; in chunks."""
+        boxes = [(low, high)]
+        for _ in self._apart:
+            low, high = _joined(low, np.minimum, np.inf), _joined(high, np.maximum, -np.inf)
+            boxes.insert(0, (low, high))
+        nothing = np.empty(0, dtype=np.int64)
+        yield from self._below(0, (nothing, nothing), boxes, True)
+
+    def _below(self, level: int, pairs: Pairs, boxes: list[tuple[Floats, Floats]], known: bool) -> Iterator[Pairs]:
+        """Pairs of leaves that meet below pairs of nodes that do, and, if so wished, below those known to be apart."""
+        while level < len(self._apart):
+            count = len(self._moves[level + 1])
+            pairs = self._concerned(_children(pairs, count), self._moves[level + 1])
+            if known:
+                pairs = _both(pairs, self._apart[level])
+            level += 1
+            pairs = _meeting(pairs, *boxes[level])
+            if len(pairs[0]) > _CHUNK:
+                for start in range(0, len(pairs[0]), _CHUNK):
+                    part = slice(start, start + _CHUNK)
+                    yield from self._below(level, (pairs[0][part], pairs[1][part]), boxes, False)
+                pairs = pairs[0][:0], pairs[1][:0]
+        yield pairs
+
+
+def _meeting(pairs: Pairs, low: Floats, high: Floats) -> Pairs:
+    first, second = pairs
+    for axis in range(3):
+        met = (low[axis][first] <= high[axis][second]) & (low[axis][second] <= high[axis][first])
+        first, second = first[met], second[met]
+    return first, second
+
+
+def _both(pairs: Pairs, more: Pairs) -> Pairs:
+    return np.concatenate([pairs[0], more[0]]), np.concatenate([pairs[1], more[1]])
+
+
+def _joined(values: Values, join: np.ufunc, neutral: float) -> Values:
+    """Values (..., count) of a level joined two by two into those of the level above."""
+    count = values.shape[-1]
+    if count % 2:
+        values = np.concatenate([values, np.full((*values.shape[:-1], 1), neutral, values.dtype)], axis=-1)
+    joined: Values = join(values[..., 0::2], values[..., 1::2])
+    return joined
+
+
+def _children(pairs: Pairs, count: int) -> Pairs:
+    """Pairs of children, the smaller first, of pairs of nodes; a node may be paired with itself. ``count`` exist."""
+    first, second = pairs
+    itself = first == second
+    one, other = 2 * first, 2 * second
+    firsts = np.concatenate([one, one, one + 1, (one + 1)[~itself]])
+    seconds = np.concatenate([other, other + 1, other + 1, other[~itself]])
+    exist = seconds < count
+    return firsts[exist], seconds[exist]
+
+
+def _unique(first: Ints, second: Ints, count: int) -> Pairs:
+    codes = distinct(first * count + second)
+    return codes // count, codes % count
+
+
+def _without(pairs: Pairs, others: Pairs, count: int) -> Pairs:
+    kept = ~among(pairs[0] * count + pairs[1], others[0] * count + others[1])
+    return pairs[0][kept], pairs[1][kept]
+
+
+def _around_vertices(faces: Ints) -> Pairs:
+    """Pairs of triangles with a vertex in common, the smaller first, and each triangle with itself."""
+    corners = faces.ravel()
+    order = np.argsort(corners, kind="stable")
+    triangles = order // 3
+    sizes = np.bincount(corners)
+    sizes = sizes[sizes > 0]
+    starts = np.cumsum(sizes) - sizes
+    members = np.arange(len(faces))
+    firsts, seconds = [members], [members]
+    for size in np.unique(sizes):
+        if 1 < size <= _MOST_AROUND_A_VERTEX:
+            around = np.sort(triangles[starts[sizes == size][:, None] + np.arange(size)], axis=1)
+            one, other = np.triu_indices(size, 1)
+            firsts.append(around[:, one].ravel())
+            seconds.append(around[:, other].ravel())
+    return _unique(np.concatenate(firsts), np.concatenate(seconds), len(faces))
+
+
+def halving_order(places: Floats) -> Ints:
+    """(m,) items so ordered that every node of the tree holds what is on one side of its parent's longest extent.
+
+    ``places`` (d, m) are coordinates in as many dimensions as one likes.
+    """
+    count = places.shape[1]
+    order = np.arange(count)
+    size = 1 << max(0, count - 1).bit_length()
+    while size > 1:
+        starts = np.arange(0, count, size)
+        extents = np.maximum.reduceat(places, starts, axis=1) - np.minimum.reduceat(places, starts, axis=1)
+        node = np.arange(count) // size
+        along = places[np.argmax(extents, axis=0)[node], np.arange(count)]
+        # One number, the node and the place in it, sorts faster than two.
+        lowest = along.min()
+        sorting = np.argsort(node + (along - lowest) / (2.0 * (along.max() - lowest) or 1.0))
+        order, places = order[sorting], places[:, sorting]
+        size //= 2
+    return order

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In-betweens that cross themselves more than their keys do: where, and how far around the cure should reach."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from ..arrays import Bools, Floats, Ints
+from ..triangles.topology import sides
+from .crossings import CrossingSearch
+
+# The cure fades over so many rings of neighbours around the crossing triangles.
+_FADING_RINGS = 4
+
+
+class CrossingLimit:
+    """How much a surface may cross itself between its keys: no more than the worse of them.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+    key0, key1 : (n, 3)
+    still : (n,) bool
+        Vertices that are in the same place in both keys and all shapes.
+    """
+
+    def __init__(self, faces: Ints, key0: Floats, key1: Floats, still: Bools) -> None:
+        self._faces = faces
+        # Where neither triangle moves, nothing changes between the keys.
+        self._search = CrossingSearch(faces, (key0, key1), ~still[faces].all(axis=1))
+        in_keys = [self._codes(key) for key in (key0, key1)]
+        self._known = np.concatenate(in_keys)
+        self._allowed = max(len(codes) for codes in in_keys)
+
+    def excess(self, shape: Floats) -> int:
+        """Crossing pairs of triangles of ``shape`` (n, 3) beyond what the keys have."""
+        return max(0, len(self._codes(shape)) - self._allowed)
+
+    def new_vertices(self, shape: Floats) -> Bools:
+        """(n,) corners of triangles that cross in ``shape`` (n, 3) and in neither key; none within the limit."""
+        found = np.zeros(len(shape), dtype=bool)
+        codes = self._codes(shape)
+        if len(codes) > self._allowed:
+            fresh = codes[~np.isin(codes, self._known)]
+            triangles = np.concatenate([fresh // len(self._faces), fresh % len(self._faces)])
+            found[self._faces[triangles].ravel()] = True
+        return found
+
+    def faded(self, chosen: Bools) -> Floats:
+        """(n,) 1 at the chosen vertices, falling to 0 a few rings of neighbours away."""
+        edges = sides(self._faces)
+        count = len(chosen)
+        neighbours = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
+        reached = chosen.astype(np.float64)
+        total = reached.copy()
+        for _ in range(_FADING_RINGS):
+            reached = np.minimum(reached + neighbours @ reached + neighbours.T @ reached, 1.0)
+            total += reached
+        return np.asarray(total / (_FADING_RINGS + 1))
+
+    def _codes(self, shape: Floats) -> Ints:
+        """One number for each crossing pair of triangles of which one moves."""
+        pairs = self._search.pairs(shape)
+        return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])

@@ -1,0 +1,315 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mappings in few numbers: the lowest modes of their representation, quantised (Chen & Lui, section 7).
+
+Three schemes share the file format:
+
+``published``
+    The six channels of P, averaged to the vertices, projected on the first k modes, averaged back. P may lose its
+    positive definiteness; the map cannot be rebuilt then.
+``logarithm``
+    The same on log P, whose exponential is positive definite whatever the numbers are.
+``fitted``
+    log P again, but in modes to which all vertices count alike, with the coefficients whose rebuilt map is nearest
+    (module ``nearest_map``), each rounded as coarsely as it can be: an error in a mode of eigenvalue lambda moves
+    vertices by about one over the root of lambda, so steps grow with that root. What the rebuilt map misses may follow
+    as displacements, rounded too: where detail is local, few modes and a remainder are smallest.
+
+The boundary is not stored where it slides: the conditions of the rebuilding give it back exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
+
+from ..arrays import Bools, Floats
+from ..errors import InputError
+from ..maps.boundary_conditions import Conditions
+from ..maps.mapping import Mapping
+from ..maps.reconstruction import reconstruct
+from ..maps.representation import from_upper_triangle, upper_triangle
+from ..tets.mesh import TetMesh
+from .modes import Spectrum, Transfer, spectrum
+from .nearest_map import MOST_LOGARITHM, NORM, NearestMap
+
+Scheme = Literal["published", "logarithm", "fitted"]
+Boundary = Literal["sliding", "fixed"]
+
+# Numbers beyond so many steps do not fit the format; a step that makes larger ones is too small to be of use.
+MOST_STEPS = 2**40
+# Steps of the search for the nearest map: for the first of a row of maps, and for those that begin at the one before.
+_FIRST_ITERATIONS, _NEXT_ITERATIONS = 60, 20
+_CHECK_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Compressed:
+    """F maps of one mesh as whole numbers, all with the same steps.
+
+    Parameters
+    ----------
+    scheme, boundary
+    step : float
+        What the number 1 stands for in the lowest mode.
+    numbers : (F, k, 6) int64
+        Coefficients of the six channels in steps, by mode.
+    held : (F, b, 3)
+        Images of the boundary's vertices where it is fixed, in the order of their numbers; none where it slides.
+    check : float
+        A sum over the rebuilt maps, by which the restoring knows that it has rebuilt the same ones.
+    remainder_step : float
+        What the number 1 stands for in the remainder, in units of the map.
+    remainder : (F, n, 3) int64
+        Displacements that follow the rebuilding, in steps; n is 0 for none.
+    """
+
+    scheme: Scheme
+    boundary: Boundary
+    step: float
+    numbers: NDArray[np.int64]
+    held: Floats
+    check: float = 0.0
+    remainder_step: float = 0.0
+    remainder: NDArray[np.int64] | None = None
+
+
+class Codec:
+    """Compresses and restores maps of one mesh by one scheme; the modes are computed once.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    modes : int
+        How many modes there are to choose from; 0 for a remainder alone.
+    scheme : Scheme
+    boundary : Boundary
+    observed : (n, N) sparse array, optional
+        What is to be restored of a map: these combinations of its values, such as the vertices of a surface in the
+        mesh; the values themselves where it is not given. Only for the scheme ``fitted``.
+    known : Spectrum, optional
+        The modes, where they were computed already for a scheme with the same ones.
+
+    Raises
+    ------
+    InputError
+        If the mesh has too few vertices for so many modes.
+    """
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        modes: int,
+        scheme: Scheme = "fitted",
+        boundary: Boundary = "sliding",
+        observed: csr_array | None = None,
+        known: Spectrum | None = None,
+    ) -> None:
+        self.mesh, self.scheme, self.boundary = mesh, scheme, boundary
+        self.observes_map = observed is None
+        self._observed = csr_array(eye_array(len(mesh.points))) if observed is None else observed
+        self.points: Floats = np.asarray(self._observed @ mesh.points)
+        self.diagonal = float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        if known is None and modes:
+            known = spectrum(mesh, modes, "equal" if scheme == "fitted" else "volume")
+        self.spectrum = known or Spectrum(np.empty(0), np.empty((len(mesh.points), 0)))
+        self._transfer = Transfer(mesh)
+        self._at_tets = np.asarray(self._transfer.to_tets @ self.spectrum.modes)
+
+    @property
+    def modes(self) -> int:
+        """How many modes there are."""
+        return int(self._at_tets.shape[1])
+
+    @cached_property
+    def _kept(self) -> Bools:
+        """(n, 3) what the conditions give exactly, so that no remainder is needed."""
+        if self.observes_map:
+            return self._conditions(np.zeros((self._boundary_rows.size, 3))).held
+        return np.zeros(self.points.shape, dtype=bool)
+
+    @cached_property
+    def _boundary_rows(self) -> NDArray[np.int64]:
+        return np.unique(self.mesh.boundary_faces) if self.boundary == "fixed" else np.empty(0, dtype=np.int64)
+
+    def projected(self, mapping: Mapping, modes: int) -> Floats:
+        """(k, 6) coefficients of a map's representation, off-diagonal channels times the root of two.
+
+        Averaged to the vertices and projected; in the scheme ``fitted`` those whose means over corners fit the
+        tetrahedra best in the least-squares sense.
+        """
+        stretch = mapping.stretch if self.scheme == "published" else logarithm(mapping.stretch)
+        channels = upper_triangle(stretch) * NORM
+        if self.scheme == "fitted":
+            basis, weights = self._at_tets[:, :modes], self.mesh.volumes[:, None]
+            return np.asarray(np.linalg.lstsq(basis * np.sqrt(weights), channels * np.sqrt(weights), rcond=None)[0])
+        weighted = self._transfer.vertex_volumes[:, None] * (self._transfer.to_vertices @ channels)
+        return np.asarray(self.spectrum.modes[:, :modes].T @ weighted, dtype=np.float64)
+
+    def coefficients(self, targets: Floats, modes: int) -> Floats:
+        """(F, k, 6) coefficients in the first modes for targets (F, n, 3); see ``projected``.
+
+        Raises
+        ------
+        InputError
+            If a map is folded or moves a sliding boundary out of its faces.
+        """
+        held = self.held(targets)
+        if not modes:
+            return np.zeros((len(targets), 0, 6))
+        if self.scheme != "fitted":
+            return np.stack([self.projected(Mapping(self.mesh, values), modes) for values in targets])
+        found: list[Floats] = []
+        for values, kept in zip(targets, held, strict=True):
+            if found:
+                start, iterations = found[-1], _NEXT_ITERATIONS
+            else:
+                iterations = _FIRST_ITERATIONS
+                start = self.projected(Mapping(self.mesh, values), modes) if self.observes_map else np.zeros((modes, 6))
+            problem = NearestMap(self.mesh, self._conditions(kept), self._observed)
+            found.append(
+                problem.coefficients(self._at_tets[:, :modes], start, self.steps(modes), values, iterations)
+            )
+        return np.stack(found)
+
+    def steps(self, modes: int) -> Floats:
+        """(k,) how much coarser each mode may be rounded than the lowest."""
+        if self.scheme != "fitted":
+            return np.ones(modes)
+        eigenvalues = self.spectrum.eigenvalues[:modes]
+        lowest = self.spectrum.eigenvalues[1] if len(self.spectrum.eigenvalues) > 1 else 1.0
+        return np.asarray(np.sqrt(1.0 + eigenvalues / lowest))
+
+    def rounded(self, targets: Floats, coefficients: Floats, step: float) -> tuple[Compressed, Floats]:
+        """Coefficients (F, k, 6) as multiples of a step, and the maps (F, N, 3) that are rebuilt from these.
+
+        Raises
+        ------
+        InputError
+            If the step is too small.
+        ReconstructionError
+            If a representation is not positive definite, which happens with the scheme ``published``.
+        """
+        steps = step * self.steps(coefficients.shape[1])[:, None]
+        compressed = Compressed(
+            self.scheme, self.boundary, step, _whole(coefficients / steps, step), self.held(targets)
+        )
+        rebuilt = self.rebuilt(compressed)
+        return replace(compressed, check=self._check(rebuilt)), rebuilt
+
+    def rebuilt(self, compressed: Compressed) -> Floats:
+        """(F, N, 3) the maps that belong to the numbers, without a remainder.
+
+        Raises
+        ------
+        InputError
+            If there are more modes than this codec has, or the boundary belongs to another mesh.
+        ReconstructionError
+            If a representation is not positive definite, which happens with the scheme ``published``.
+        """
+        return np.stack(
+            [
+                reconstruct(self.mesh, self.stretch(compressed, number), self._conditions(held)).values
+                for number, held in enumerate(compressed.held)
+            ]
+        )
+
+    def restore(self, compressed: Compressed) -> Floats:
+        """(F, n, 3) what was compressed, as nearly as the numbers have it; the boundary exactly.
+
+        Raises
+        ------
+        InputError, ReconstructionError
+            As ``rebuilt``, and if this machine rebuilds other maps than the one that compressed them.
+        """
+        rebuilt = self.rebuilt(compressed)
+        if not abs(self._check(rebuilt) - compressed.check) <= _CHECK_TOLERANCE * self.diagonal:
+            raise InputError(
+                "The maps come out differently than where they were compressed: the file is damaged, or the mesh is so "
+                "symmetric that its modes are not unique; compress it without modes, or break the symmetry."
+            )
+        return self.finished(compressed, rebuilt)
+
+    def finished(self, compressed: Compressed, rebuilt: Floats) -> Floats:
+        """(F, n, 3) what is observed of rebuilt maps (F, N, 3), with the remainder."""
+        values = self.observe(rebuilt)
+        if compressed.remainder is None:
+            return values
+        if compressed.remainder.shape != values.shape:
+            raise InputError("The remainder belongs to another mesh.")
+        return np.asarray(values + compressed.remainder_step * compressed.remainder)
+
+    def observe(self, maps: Floats) -> Floats:
+        """(F, n, 3) what is to be restored of maps (F, N, 3)."""
+        return np.stack([np.asarray(self._observed @ values) for values in maps])
+
+    def with_remainder(self, compressed: Compressed, missed: Floats, step: float) -> Compressed:
+        """The same with what is missed, (F, n, 3), as multiples of a step; InputError if that is too small."""
+        numbers = _whole(np.where(self._kept, 0.0, missed) / step, step)
+        return replace(compressed, remainder_step=step, remainder=numbers)
+
+    def stretch(self, compressed: Compressed, number: int) -> Floats:
+        """(M, 3, 3) the representation that the numbers of a map stand for."""
+        modes = compressed.numbers.shape[1]
+        if modes > self.modes:
+            raise InputError(f"The maps have {modes} modes; {self.modes} were computed.")
+        coefficients = compressed.numbers[number] * (compressed.step * self.steps(modes))[:, None]
+        matrices = from_upper_triangle(self._at_tets[:, :modes] @ coefficients / NORM)
+        return matrices if compressed.scheme == "published" else exponential(matrices)
+
+    def held(self, targets: Floats) -> Floats:
+        """(F, b, 3) images of a fixed boundary; raises InputError for maps that cannot be compressed."""
+        if not self.observes_map:
+            return np.empty((len(targets), 0, 3))
+        for values in targets:
+            folds = Mapping(self.mesh, values).folds
+            if folds:
+                raise InputError(f"The map has {folds} folded tetrahedra; only those without can be compressed.")
+            on_faces = self.mesh.on_cube_face
+            if self.boundary == "sliding" and not np.array_equal(values[on_faces], self.mesh.points[on_faces]):
+                raise InputError(
+                    "The map moves the cube's faces out of themselves; compress it with a fixed boundary."
+                )
+        return np.asarray(targets[:, self._boundary_rows])
+
+    def _conditions(self, held: Floats) -> Conditions:
+        if self.boundary == "sliding":
+            return Conditions.sliding_cube(self.mesh)
+        if held.shape != (len(self._boundary_rows), 3):
+            raise InputError(
+                f"The stored boundary has {len(held)} vertices, that of the mesh {len(self._boundary_rows)}."
+            )
+        values = np.array(self.mesh.points)
+        values[self._boundary_rows] = held
+        return Conditions.fixed_boundary(self.mesh, values)
+
+    def _check(self, rebuilt: Floats) -> float:
+        """A sum with signs that no symmetry has."""
+        signs = 1.0 - 2.0 * (np.arange(rebuilt.size, dtype=np.uint64) * np.uint64(2654435761) >> np.uint64(16) & 1)
+        return float(signs @ rebuilt.ravel() / np.sqrt(rebuilt.size))
+
+
+def logarithm(stretch: Floats) -> Floats:
+    """(M, 3, 3) logarithms of symmetric positive definite matrices."""
+    values, vectors = np.linalg.eigh(stretch)
+    return np.asarray((vectors * np.log(values)[:, None]) @ vectors.transpose(0, 2, 1))
+
+
+def exponential(matrices: Floats) -> Floats:
+    """(M, 3, 3) exponentials of symmetric matrices: symmetric positive definite ones."""
+    values, vectors = np.linalg.eigh(matrices)
+    stretches = np.exp(np.clip(values, -MOST_LOGARITHM, MOST_LOGARITHM))
+    product = (vectors * stretches[:, None]) @ vectors.transpose(0, 2, 1)
+    return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))
+
+
+def _whole(multiples: Floats, step: float) -> NDArray[np.int64]:
+    numbers = np.round(multiples)
+    if not np.abs(numbers).max(initial=0.0) < MOST_STEPS:
+        raise InputError(f"The step {step:.3g} is too small for this map; choose a larger one.")
+    return numbers.astype(np.int64)

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of whole numbers as few bytes: small ones cost little, and what goes on as before costs nearly nothing."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .prediction import Predictor
+from .range_coder import decoded, encoded
+
+# Orders of the differences along the row: none, one for what stays, two for what moves on steadily.
+_ORDERS = 3
+
+
+def packed(rows: NDArray[np.int64], predictor: Predictor | None = None) -> bytes:
+    """Rows (F, n, c) as bytes: differences along the row, of whichever order makes them smallest.
+
+    Where the n numbers belong to points a predictor takes away what neighbours tell.
+    """
+    choices = [_differences(rows, order) for order in range(max(min(_ORDERS, len(rows)), 1))]
+    order, left = min(enumerate(choices), key=lambda choice: float(np.log2(1 + np.abs(choice[1])).sum()))
+    if predictor is not None:
+        left = np.array([predictor.differences(row) for row in left]).reshape(rows.shape)
+    return bytes([order]) + encoded(left.transpose(0, 2, 1))
+
+
+def unpacked(data: bytes, shape: tuple[int, int, int], predictor: Predictor | None = None) -> NDArray[np.int64]:
+    """The rows of this shape; raises InputError where the data does not hold as many."""
+    if not data or data[0] >= _ORDERS:
+        raise InputError("The numbers are stored in a way this version does not know; the file is damaged.")
+    count, points, channels = shape
+    rows = decoded(data[1:], count * points * channels).reshape(count, channels, points).transpose(0, 2, 1)
+    if predictor is not None:
+        rows = np.array([predictor.numbers(row) for row in rows]).reshape(shape)
+    for _ in range(data[0]):
+        rows = np.cumsum(rows, axis=0)
+    return np.ascontiguousarray(rows)
+
+
+def _differences(rows: NDArray[np.int64], order: int) -> NDArray[np.int64]:
+    for _ in range(order):
+        rows = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
+    return rows
+
+
+def planes(numbers: NDArray[np.int64]) -> bytes:
+    """Signed whole numbers as bytes: the lowest byte of all, then the next, as far as the largest needs."""
+    flat = np.ascontiguousarray(numbers, dtype=np.int64).ravel()
+    # 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
+    folded = ((flat << 1) ^ (flat >> 63)).astype("<u8")
+    table = folded.view(np.uint8).reshape(-1, 8)
+    used = int(np.flatnonzero(table.any(axis=0)).max(initial=-1)) + 1
+    return np.ascontiguousarray(table[:, :used].T).tobytes()
+
+
+def inflated(data: bytes, size: int) -> bytes:
+    """What was deflated, exactly ``size`` bytes; never more than that are made.
+
+    Raises
+    ------
+    InputError
+        If the data is damaged, or not as long.
+    """
+    try:
+        result = zlib.decompressobj().decompress(data, size + 1)
+    except zlib.error as error:
+        raise InputError(f"The compressed data is damaged: {error}.") from error
+    if len(result) != size:
+        raise InputError("The compressed data has another length than its header says; the file is damaged.")
+    return result

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The part of a bake that is done once for two keys: the cube filled, the fold-free map fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from ..arrays import Floats
+from ..keys.embedding import Embedding
+from ..keys.keypair import KeyPair
+from ..keys.orientation import require_reachable
+from ..meshing.cube import fill_cube
+from ..settings import FitOptions
+from ..support.progress import Progress, Steps, staged, timed
+from ..support.threads import beside
+from ..surface.path import SurfacePath
+from ..tets.point_location import interpolation_matrix
+from .continuation import follow_path, path_to
+from .fitted_map import FittedMap
+from .fold_free import FoldFreeFitter
+
+# Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
+_LARGE_RESIDUAL = 0.03
+
+
+def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
+    """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
+
+    Raises
+    ------
+    InputError
+        If the second key is the first one mirrored or turned inside out, which no map without folds reaches.
+    MeshingError
+        If the engine asked for cannot fill the cube.
+
+    Notes
+    -----
+    Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
+    both keys all the same.
+    """
+    require_reachable(pair)
+    seconds: dict[str, float] = {}
+    embedding = Embedding.of(pair)
+    yield Progress("mesh", 0.0)
+    with beside(partial(_way, embedding, options, seconds)) as way:
+        with timed(seconds, "mesh"):
+            filled = fill_cube(embedding.key0, pair.faces, options)
+        yield Progress("mesh", 1.0)
+        yield Progress("locate", 0.0)
+        with timed(seconds, "locate"):
+            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
+        yield Progress("locate", 1.0)
+        yield Progress("fit", 0.0)
+        path, targets = way.result()
+    with timed(seconds, "fit"):
+        fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
+        followed = yield from staged("fit", follow_path(fitter, targets))
+    yield Progress("fit", 1.0)
+    fitted = FittedMap(
+        pair,
+        filled.mesh,
+        followed.maps,
+        followed.turns,
+        options,
+        filled.engine,
+        embedding,
+        landmarks,
+        filled.notes,
+        seconds,
+        path,
+    )
+    missed = fitted.landmark_residual().rms
+    if path.inside_out:
+        note = (
+            f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
+            "does that, and the mode straight may look no worse."
+        )
+    elif missed > _LARGE_RESIDUAL:
+        note = (
+            f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
+            "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
+        )
+    else:
+        return fitted
+    return replace(fitted, notes=(*filled.notes, note))
+
+
+def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
+    """The surface's own path to the second key, and the shapes on it that lead the map."""
+    with timed(seconds, "path"):
+        path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
+        return path, path_to(path, embedding.key1)
+
+
+def _closed_parts(count: int) -> str:
+    return "A closed part of the mesh is" if count == 1 else f"{count} closed parts of the mesh are"

@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fold-free maps of the cube with a sliding boundary and soft landmarks.
+
+The energy mixes a conformal and a volume term (Garanzha et al. 2021, "Foldover-free maps in 50 lines of code") and is
+infinite on folded elements: a line search that starts at a map without folds never leaves such maps. It is minimised
+by a Gauss-Newton step whose element blocks are projected to be positive semi-definite, solved by preconditioned
+conjugate gradients. Targets far away are approached along a path (module ``continuation``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import bsr_array, csr_array, diags_array
+from scipy.sparse.linalg import LinearOperator, cg
+
+from ..arrays import Bools, Floats
+from ..numerics.assembly import StiffnessPattern
+from ..numerics.rotations import cofactors, determinants
+from ..tets.mesh import TetMesh
+
+LANDMARK_WEIGHT = 1e4
+_VOLUME_SHARE = 0.5
+_RELATIVE_DECREASE = 1e-4
+_CG_TOLERANCE = 1e-3
+_CG_ITERATIONS = 400
+_BACKTRACKS = 12
+
+
+class FoldFreeFitter:
+    """Fits maps of one mesh to landmarks; everything that does not depend on the targets is set up once.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    landmarks : (n, N) sparse array
+        Rows of barycentric coordinates: landmark i is at ``landmarks[i] @ values``.
+    weights : (n,)
+        Landmark weights with sum 1.
+    """
+
+    def __init__(self, mesh: TetMesh, landmarks: csr_array, weights: Floats) -> None:
+        self.mesh = mesh
+        self.landmarks = landmarks
+        self._weights = weights
+        self._free = ~mesh.on_cube_face
+        self._pattern = StiffnessPattern(mesh.tets, len(mesh.points))
+        # Landmarks lie inside tetrahedra, so their normal matrix fits into the pattern of the mesh.
+        self._landmark_matrix = csr_array(landmarks.T @ diags_array(weights) @ landmarks)
+        self._landmark_blocks = self._blocks_of(self._landmark_matrix)
+
+    def fit(self, start: Floats, targets: Floats, most_iterations: int) -> Floats:
+        """Draw the landmarks towards ``targets`` (n, 3), starting at a map without folds, ``start`` (N, 3).
+
+        Returns the values of a map without folds. Boundary coordinates that the cube's faces hold stay as they are.
+        """
+        values = start
+        misfit = self.misfit(start, targets)
+        for _ in range(most_iterations):
+            energy, gradient, blocks = self._model(values, misfit)
+            step = self._newton_step(gradient, blocks)
+            slope = float((gradient * step).sum())
+            length, values = self._line_search(values, step, energy, slope, misfit)
+            if length == 0.0 or (length == 1.0 and -slope < _RELATIVE_DECREASE * energy):
+                break
+        return values
+
+    def residuals(self, values: Floats, targets: Floats) -> Floats:
+        """(n, 3) landmark positions minus targets."""
+        return np.asarray(self.landmarks @ values - targets)
+
+    def misfit(self, origin: Floats, targets: Floats) -> Misfit:
+        """What maps cost for missing ``targets`` (n, 3), to be asked for near the map ``origin`` (N, 3)."""
+        residuals = self.residuals(origin, targets)
+        at_origin = 0.5 * LANDMARK_WEIGHT * float(self._weights @ (residuals**2).sum(axis=1))
+        slope = LANDMARK_WEIGHT * (self.landmarks.T @ (self._weights[:, None] * residuals))
+        return Misfit(origin, at_origin, np.asarray(slope), self._landmark_matrix)
+
+    def _energy(self, values: Floats, misfit: Misfit) -> float:
+        """Energy of a map, infinite where it has a fold."""
+        jacobians = self.mesh.jacobians(values)
+        determinant = determinants(jacobians)
+        if determinant.min() <= 0.0:
+            return np.inf
+        density = _density(np.einsum("mij,mij->m", jacobians, jacobians), determinant)
+        return float(self.mesh.volumes @ density) + misfit.at(values)[0]
+
+    def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
+        """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3)."""
+        jacobians = self.mesh.jacobians(values)
+        volumes = self.mesh.volumes
+        squares = np.einsum("mij,mij->m", jacobians, jacobians)
+        cofactor = cofactors(jacobians)
+        terms = _density_derivatives(squares, determinants(jacobians))
+        stress = terms.linear[:, None, None] * jacobians + terms.slope[:, None, None] * cofactor
+        missed, misfit_gradient = misfit.at(values)
+        gradient = self.mesh.divergence(volumes[:, None, None] * stress) + misfit_gradient
+        gradient[~self._free] = 0.0
+        blocks = _projected_blocks(volumes, self.mesh.gradients, jacobians, cofactor, squares, terms)
+        return float(volumes @ terms.density) + missed, gradient, blocks
+
+    def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
+        matrix = self._pattern.assemble_blocks(element_blocks)
+        matrix.data += LANDMARK_WEIGHT * self._landmark_blocks
+        free = self._free.ravel()
+        diagonal = _diagonal_blocks(matrix)
+        inverse = np.linalg.inv(_restricted(diagonal, self._free))
+
+        def precondition(vector: Floats) -> Floats:
+            return np.asarray(np.einsum("nij,nj->ni", inverse, vector.reshape(-1, 3)).ravel() * free)
+
+        def multiply(vector: Floats) -> Floats:
+            return np.asarray(matrix @ (vector * free) * free)
+
+        size = len(free)
+        operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
+        smoother = LinearOperator((size, size), matvec=precondition, dtype=np.float64)
+        step, _ = cg(operator, -gradient.ravel(), rtol=_CG_TOLERANCE, maxiter=_CG_ITERATIONS, M=smoother)
+        return np.asarray(step).reshape(-1, 3)
+
+    def _line_search(
+        self, values: Floats, step: Floats, energy: float, slope: float, misfit: Misfit
+    ) -> tuple[float, Floats]:
+        """The first of the lengths 1, 1/2, 1/4, ... that lowers the energy enough, and where it leads; 0 if none."""
+        length = 1.0
+        for _ in range(_BACKTRACKS):
+            moved = values + length * step
+            if self._energy(moved, misfit) <= energy + 1e-4 * length * slope:
+                return length, moved
+            length *= 0.5
+        return 0.0, values
+
+    def _blocks_of(self, matrix: csr_array) -> Floats:
+        """(entries, 3, 3) multiples of the identity on the mesh's pattern."""
+        pattern = self._pattern.assemble(np.zeros((len(self.mesh.tets), 4, 4)))
+        rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
+        values = np.zeros(len(pattern.indices))
+        codes = rows * pattern.shape[0] + pattern.indices
+        entries = matrix.tocoo()
+        places = np.searchsorted(codes, entries.row.astype(np.int64) * pattern.shape[0] + entries.col)
+        values[places] = entries.data
+        return np.asarray(values[:, None, None] * np.eye(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """The quadratic cost of missed landmarks, known by its value and slope at one map: no landmark is looked at again.
+
+    Parameters
+    ----------
+    origin : (N, 3)
+    at_origin : float
+    slope : (N, 3)
+        Gradient at the origin.
+    matrix : (N, N) sparse
+        The landmarks' normal matrix, weights included.
+    """
+
+    origin: Floats
+    at_origin: float
+    slope: Floats
+    matrix: csr_array
+
+    def at(self, values: Floats) -> tuple[float, Floats]:
+        """Cost and gradient (N, 3) of a map (N, 3)."""
+        change = values - self.origin
+        curved = LANDMARK_WEIGHT * (self.matrix @ change)
+        cost = self.at_origin + float((change * (self.slope + 0.5 * curved)).sum())
+        return cost, np.asarray(self.slope + curved)
+
+
+@dataclass(frozen=True)
+class _Density:
+    """Energy density and its derivatives: stress = linear * J + slope * cof(J)."""
+
+    density: Floats
+    linear: Floats
+    slope: Floats
+    mixed: Floats
+    curvature: Floats
+
+
+def _density(squares: Floats, determinant: Floats) -> Floats:
+    shape = (1.0 - _VOLUME_SHARE) / 3.0 * squares * determinant ** (-2.0 / 3.0)
+    return np.asarray(shape + 0.5 * _VOLUME_SHARE * (determinant + 1.0 / determinant))
+
+
+def _density_derivatives(squares: Floats, determinant: Floats) -> _Density:
+    """First and second derivatives with respect to |J|^2 and det J."""
+    shape = (1.0 - _VOLUME_SHARE) / 3.0 * determinant ** (-2.0 / 3.0)
+    shape_slope = -2.0 / 3.0 * shape / determinant
+    shape_curvature = -5.0 / 3.0 * shape_slope / determinant
+    slope = squares * shape_slope + 0.5 * _VOLUME_SHARE * (1.0 - determinant**-2)
+    curvature = squares * shape_curvature + _VOLUME_SHARE * determinant**-3
+    return _Density(_density(squares, determinant), 2.0 * shape, slope, 2.0 * shape_slope, curvature)
+
+
+def _projected_blocks(
+    volumes: Floats, gradients: Floats, jacobians: Floats, cofactor: Floats, squares: Floats, terms: _Density
+) -> Floats:
+    """(M, 4, 4, 3, 3) element blocks of the Gauss-Newton matrix, positive semi-definite.
+
+    With det J linearised the Hessian is linear * I + mixed (J C^T + C J^T) + curvature C C^T on the span of J and
+    its cofactor C, and a multiple of the identity elsewhere; the 2 x 2 part is projected in closed form.
+    """
+    norm = np.sqrt(np.maximum(squares, 1e-300))
+    first = jacobians / norm[:, None, None]
+    along = np.einsum("mij,mij->m", cofactor, first)
+    second = cofactor - along[:, None, None] * first
+    across = np.sqrt(np.einsum("mij,mij->m", second, second))
+    second /= np.maximum(across, 1e-300)[:, None, None]
+    top = 2.0 * terms.mixed * norm * along + terms.curvature * along**2
+    corner = terms.mixed * norm * across + terms.curvature * along * across
+    bottom = terms.curvature * across**2
+    top, corner, bottom = _projected_2x2(terms.linear, top, corner, bottom)
+    # Rows of the factors: gradients contracted with the two directions. A block row of all corners and axes at once
+    # is one small product for each tetrahedron.
+    factors = np.stack([gradients @ first.transpose(0, 2, 1), gradients @ second.transpose(0, 2, 1)], axis=3)
+    factors = factors.reshape(-1, 12, 2)
+    mixed = volumes[:, None, None] * np.stack([top, corner, corner, bottom], axis=1).reshape(-1, 2, 2)
+    rows = (factors @ mixed) @ factors.transpose(0, 2, 1)
+    blocks = np.ascontiguousarray(rows.reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4))
+    laplacian = (volumes * terms.linear)[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
+    for axis in range(3):
+        blocks[..., axis, axis] += laplacian
+    return blocks
+
+
+def _projected_2x2(
+    shift: Floats, top: Floats, corner: Floats, bottom: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Clamp the eigenvalues of shift * I + [[top, corner], [corner, bottom]] at a small part of shift."""
+    mean, half = 0.5 * (top + bottom), 0.5 * (top - bottom)
+    radius = np.hypot(half, corner)
+    floor = -0.99 * shift
+    high, low = np.maximum(mean + radius, floor), np.maximum(mean - radius, floor)
+    mean, stretch = 0.5 * (high + low), 0.5 * (high - low) / np.maximum(radius, 1e-300)
+    return mean + stretch * half, stretch * corner, mean - stretch * half
+
+
+def _diagonal_blocks(matrix: bsr_array) -> Floats:
+    rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+    return np.asarray(matrix.data[rows == matrix.indices])
+
+
+def _restricted(blocks: Floats, free: Bools) -> Floats:
+    """Diagonal blocks with held coordinates decoupled."""
+    kept = blocks * (free[:, :, None] & free[:, None, :])
+    kept[:, np.arange(3), np.arange(3)] += ~free
+    return np.asarray(kept)

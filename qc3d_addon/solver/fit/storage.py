@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A fitted map as bytes: versioned, without pickles, checked on the way in."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+import zlib
+from dataclasses import asdict
+
+import numpy as np
+
+from ..errors import InputError
+from ..files.npz import require_sizes
+from ..keys.keypair import KeyPair
+from ..numerics.rotations import determinants
+from ..settings import FitOptions
+from ..tets.mesh import TetMesh
+from .fitted_map import FittedMap
+
+FORMAT_VERSION = 2
+_SEAL_LENGTH = 32
+_DAMAGED = "The stored map is damaged; fit the keys again."
+_UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error
+)  # fmt: skip
+
+
+def fingerprint(pair: KeyPair) -> str:
+    """A digest of the keys, faces and edges: a stored map belongs to keys with the same digest."""
+    digest = hashlib.sha256()
+    for array in (pair.key0, pair.key1, pair.faces, pair.edges):
+        digest.update(np.int64(len(array)).tobytes())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _seal(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest()
+
+
+def to_bytes(fitted: FittedMap) -> bytes:
+    """Store the mesh and the map behind a seal; the keys themselves are not stored, only their digest."""
+    header = {
+        "version": FORMAT_VERSION,
+        "fingerprint": fingerprint(fitted.pair),
+        "options": asdict(fitted.options),
+        "engine": fitted.engine,
+        "notes": list(fitted.notes),
+    }
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
+        points=fitted.mesh.points,
+        tets=fitted.mesh.tets.astype(np.int32),
+        maps=fitted.maps,
+        turns=fitted.turns,
+    )
+    return _seal(buffer.getvalue()) + buffer.getvalue()
+
+
+def _is_whole(data: bytes) -> bool:
+    return data[:_SEAL_LENGTH] == _seal(data[_SEAL_LENGTH:])
+
+
+def why_unusable(data: bytes) -> str | None:
+    """Why ``from_bytes`` would refuse bytes that were stored for the same keys, without unpacking them; or None.
+
+    Returns
+    -------
+    The end of a sentence about the stored map: "is damaged", or by which version it was stored.
+    """
+    if not _is_whole(data):
+        return "is damaged"
+    try:
+        with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
+            require_sizes(archive)
+        with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
+            version = json.loads(bytes(stored["header"]))["version"]
+    except _UNREADABLE:
+        return "is damaged"
+    if not isinstance(version, int):
+        return "is damaged"
+    if version == FORMAT_VERSION:
+        return None
+    return f"was stored by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
+
+
+def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
+    """Restore a map that ``to_bytes`` stored.
+
+    Raises
+    ------
+    InputError
+        If the bytes are damaged, of another version, or belong to other keys.
+    """
+    # Unpacking what is damaged can fail in many ways, or not at all.
+    if not _is_whole(data):
+        raise InputError(_DAMAGED)
+    try:
+        with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
+            require_sizes(archive)
+        with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
+            header = json.loads(bytes(stored["header"]))
+            version, owner = header["version"], header["fingerprint"]
+            if version != FORMAT_VERSION:
+                raise InputError(
+                    f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
+                )
+            options, engine = FitOptions(**header["options"]), str(header["engine"])
+            notes = tuple(str(note) for note in header["notes"])
+            points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
+            tets = np.asarray(stored["tets"], dtype=np.int64)
+    except _UNREADABLE as error:
+        raise InputError(_DAMAGED) from error
+    if owner != fingerprint(pair):
+        raise InputError("The stored map belongs to other keys or another mesh; fit the keys again.")
+    if points.ndim != 2 or points.shape[1] != 3 or maps.ndim != 3 or maps.shape[1:] != points.shape or len(maps) < 2:
+        raise InputError(_DAMAGED)
+    if tets.ndim != 2 or tets.shape[1] != 4 or not len(tets) or tets.min() < 0 or tets.max() >= len(points):
+        raise InputError(_DAMAGED)
+    if turns.shape != (len(tets), 3) or not all(np.isfinite(numbers).all() for numbers in (points, maps, turns)):
+        raise InputError(_DAMAGED)
+    mesh = TetMesh(points, tets)
+    # Jacobians can be computed only where no volume is zero.
+    if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
+        raise InputError(_DAMAGED)
+    return FittedMap.restored(pair, mesh, maps, turns, options, engine, notes)

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake is: frames at times, with a report; and which times and pairs of keys make sense."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays import Floats, Ints
+from ..errors import InputError
+from ..keys.keypair import KeyPair
+from .report import BakeReport
+
+
+@dataclass(frozen=True, eq=False)
+class Bake:
+    """The frames of one bake.
+
+    Parameters
+    ----------
+    times : (k,)
+        0 is the first key, 1 the last.
+    frames : (k, n, 3)
+        Positions in the keys' own coordinates.
+    report : BakeReport
+    measures : dict
+        Distortion of each frame at each vertex by the name of the measure, (k, n) each; empty in mode ``straight``.
+    """
+
+    times: Floats
+    frames: Floats
+    report: BakeReport
+    measures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+
+
+def evenly_spaced(count: int) -> Floats:
+    """(count + 2,) times of ``count`` in-betweens between the keys at 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If the count is negative.
+
+    Examples
+    --------
+    >>> evenly_spaced(1)
+    array([0. , 0.5, 1. ])
+    """
+    if count < 0:
+        raise InputError(f"The number of in-betweens is {count}; it must be 0 or more.")
+    return np.linspace(0.0, 1.0, count + 2)
+
+
+def checked_times(times: ArrayLike) -> Floats:
+    """(k,) times of frames; raises InputError where they are no numbers from 0 to 1."""
+    try:
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    except (TypeError, ValueError) as reason:
+        raise InputError("The times of the frames must be numbers.") from reason
+    if wanted.ndim != 1 or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
+        raise InputError("The times of the frames must be a list of numbers from 0 (first key) to 1 (last key).")
+    return wanted
+
+
+def require_chain(pairs: Sequence[KeyPair]) -> None:
+    """Raise InputError unless every pair begins with the key that ended the one before."""
+    for left, right in pairwise(pairs):
+        if not np.array_equal(left.key1, right.key0):
+            raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
+
+
+def split(times: Floats, count: int) -> tuple[Ints, Floats]:
+    """Number of the pair and time within it, 0..1, for times along a chain of ``count`` pairs."""
+    along = times * count
+    # Times like 1/3 are not exact: what is meant to be a key is one.
+    whole = np.round(along)
+    along = np.where(np.abs(along - whole) < 1e-9, whole, along)
+    segments = np.minimum(np.floor(along), count - 1)
+    return segments.astype(np.int64), along - segments

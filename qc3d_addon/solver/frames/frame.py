@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One in-between, and the certificate that its map has no folds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..fit.fitted_map import FittedMap
+from ..numerics.rotations import determinants
+from .report import Certificate
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """An in-between of a pair of keys.
+
+    Parameters
+    ----------
+    positions : (n, 3)
+        In the keys' coordinates.
+    crossings : int
+        Pairs of triangles that cross beyond what the worse of the two keys has.
+    values : (N, 3), optional
+        The frame's map, cube units; none in mode ``straight``.
+    certificate : Certificate, optional
+        What that map's determinants say.
+    """
+
+    positions: Floats
+    crossings: int
+    values: Floats | None = None
+    certificate: Certificate | None = None
+
+    @classmethod
+    def of(
+        cls, fitted: FittedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int
+    ) -> Frame:
+        """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube."""
+        determinant = determinants(fitted.mesh.jacobians(values))
+        worst = int(np.argmin(determinant))
+        place = fitted.embedding.from_cube(values[fitted.mesh.tets[worst]].mean(axis=0)[None], time)[0]
+        folds = int((determinant <= 0.0).sum())
+        certificate = Certificate(time, folds, float(determinant[worst]), place.tolist(), repaired)
+        return cls(positions, crossings, values, certificate)

@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mode ``natural``: the surface by its own rotations and stretches, carried by a map of the cube without folds."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Generator, Sequence
+from functools import partial
+from itertools import chain
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Bools, Floats, Ints
+from ..collision.colliders import CollisionResolver
+from ..collision.self_crossings import CrossingLimit
+from ..fit.fitted_map import FittedMap
+from ..numerics.rotation_unwrapping import Turning, swing_beside
+from ..support.threads import batches, beside, in_threads
+from ..surface.end_rates import Rates, hermite
+from ..surface.path import SurfacePath
+from .extra_turns import ExtraSpins
+from .frame import Frame
+from .volume_path import VolumePath
+
+_UNCROSSING_ATTEMPTS = 3
+# How often the surface is solved again around what colliders push.
+_PUSHES = 4
+# How many times as strongly the surface is drawn to the volume's anchors at a crossing.
+_STRONGEST_ANCHOR = 1e5
+
+
+class NaturalFrames:
+    """In-betweens of a fitted pair; both keys are met, what both leave in place stays, no map has folds.
+
+    Parameters
+    ----------
+    fitted : FittedMap
+    """
+
+    def __init__(self, fitted: FittedMap) -> None:
+        self._fitted = fitted
+        self.notes: tuple[str, ...] = ()
+        embedding, mesh = fitted.embedding, fitted.mesh
+        self._surface = fitted.surface_path
+        self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
+        if fitted.options.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
+            self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
+        with beside(lambda: CrossingLimit(fitted.pair.faces, embedding.key0, embedding.key1, self.still)) as limit:
+            turning = _turning_inside(fitted, self._surface)
+            self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
+        self._limit = limit.result()
+        self._slopes: tuple[Floats, Floats] | None = None
+        self._missed = [
+            key - fitted.landmarks @ self._volume.at(time)
+            for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
+        ]
+
+    @property
+    def still(self) -> Bools:
+        """(n,) vertices that stay in place."""
+        return self._surface.still
+
+    @property
+    def rows(self) -> Ints:
+        """(m,) the mesh's triangles that have rates: those with an area in both keys."""
+        return self._surface.deformation.rows
+
+    @property
+    def resting(self) -> Bools:
+        """(m,) whether a corner of these triangles stays in place."""
+        return np.asarray(self.still[self._fitted.pair.faces[self.rows]].any(axis=1))
+
+    @property
+    def components(self) -> Ints:
+        """(n,) labels of the connected components, which the rates of volumes are listed by."""
+        return self._surface.components
+
+    def key(self, end: int) -> Floats:
+        """(n, 3) the first key (0) or the second (1)."""
+        return self._fitted.pair.key1 if end else self._fitted.pair.key0
+
+    def end_rates(self) -> tuple[Rates, Rates]:
+        """Rates at both keys, in the keys' own coordinates."""
+        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**-3
+        first, second = self._surface.end_rates()
+        spins = (first.spin + motion.turn, second.spin @ motion.rotation.T + motion.turn)
+        return Rates(spins[0], first.strain, volume * first.growth), Rates(
+            spins[1], second.strain, volume * second.growth
+        )
+
+    def with_end_rates(self, first: Rates, second: Rates) -> NaturalFrames:
+        """The same in-betweens with other rates at the two keys, in the keys' own coordinates."""
+        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**3
+        spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
+        changed = copy.copy(self)
+        changed._surface = self._surface.with_end_rates(
+            Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)
+        )
+        return changed
+
+    def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
+        """The same in-betweens with velocities (n, 3) added at the two keys."""
+        changed = copy.copy(self)
+        changed._slopes = (first, second)
+        return changed
+
+    def shape(self, time: float) -> Floats:
+        """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
+        return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
+
+    def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
+        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
+        volumes: list[Floats] = []
+        positions: list[Floats] = []
+        excess: list[int] = []
+        yield 0.0
+        few = batches(times.tolist(), self._surface.shapes_at_once)
+        for maps, shapes, crossing in in_threads(self._first_try, few):
+            volumes.extend(maps)
+            positions.extend(shapes)
+            excess.extend(crossing)
+            yield len(volumes) / len(times)
+        positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
+        if resolver is not None:
+            positions = yield from self._cleared(resolver, times, volumes, positions)
+            crossings = list(in_threads(self._limit.excess, positions))
+        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
+        return list(made)
+
+    def _certified(self, moment: tuple[float, Floats, Floats, int]) -> Frame:
+        """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
+        time, values, positions, crossings = moment
+        # The maps that were fitted on the way lead nearer to the surface, and past most folds.
+        found = self._volume.followed(time, values)
+        repaired = self._fitted.folds(found) > 0
+        if repaired and not self._fitted.folds(values):
+            found, repaired = values, False
+        if repaired:
+            found = self._fitted.unfolded(found, time)
+        return Frame.of(self._fitted, self._placed(positions, time), found, time, repaired, crossings)
+
+    def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int]]:
+        """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
+        maps = self._volume.maps_at(times)
+        shapes = self._shaped(self._surface, self._moments(maps, times))
+        return maps, shapes, [self._limit.excess(shape) for shape in shapes]
+
+    def _placed(self, shape: Floats, time: float) -> Floats:
+        """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
+        pair, still = self._fitted.pair, self.still
+        positions = self._fitted.embedding.from_cube(shape, time)
+        if self._slopes is not None:
+            positions += hermite(time, *self._slopes)
+        positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
+        return positions
+
+    def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
+        """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
+        return [
+            self._spins.apply(shape, time)
+            for (time, _), shape in zip(moments, surface.shapes(moments), strict=True)
+        ]
+
+    def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
+        few = batches(moments, surface.shapes_at_once)
+        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
+
+    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
+        """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
+        landmarks, missed = self._fitted.landmarks, self._missed
+        return [
+            (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
+            for values, time in zip(maps, times, strict=True)
+        ]
+
+    def _uncrossed(
+        self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int]
+    ) -> Generator[float, None, tuple[list[Floats], list[int]]]:
+        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps.
+
+        Returns the positions and what is left of the excess of crossings in each frame.
+        """
+        reach = np.zeros(len(self.still))
+        for attempt in range(_UNCROSSING_ATTEMPTS):
+            if not any(excess):
+                break
+            yield attempt / _UNCROSSING_ATTEMPTS
+            for shape in positions:
+                reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
+            surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
+            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
+            remaining = list(in_threads(self._limit.excess, tried))
+            if sum(remaining) >= sum(excess):
+                break
+            positions, excess = tried, remaining
+        return positions, excess
+
+    def _cleared(
+        self, resolver: CollisionResolver, times: Floats, volumes: list[Floats], positions: list[Floats]
+    ) -> Generator[float, None, list[Floats]]:
+        """Push vertices out of the colliders and let the surface around give way, until none is too near."""
+        embedding = self._fitted.embedding
+        moments = times.tolist()
+        reach = np.zeros(len(self.still))
+        for attempt in range(_PUSHES + 1):
+            yield attempt / (_PUSHES + 1)
+            nearby, pushed = [], []
+            for index, time in enumerate(moments):
+                place = self._placed(positions[index], time)
+                near, moved = resolver.pushed(index, place, time)
+                nearby.append(near & ~self.still)
+                push = np.where(nearby[-1][:, None], embedding.vectors_to_cube(moved - place, time), 0.0)
+                pushed.append(positions[index] + push)
+            if not any(near.any() for near in nearby):
+                return positions
+            # The last push stands as it is; so does the only one where extra turns come on top of the surface's path.
+            if attempt == _PUSHES or self._spins:
+                return pushed
+            for near in nearby:
+                reach = np.maximum(reach, self._limit.faded(near))
+            surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
+            anchored = self._moments(volumes, moments)
+            positions = self._all_shaped(
+                surface,
+                [
+                    (time, np.where(reach[:, None] > 0.0, push, anchor))
+                    for (time, anchor), push in zip(anchored, pushed, strict=True)
+                ],
+            )
+        return positions
+
+
+def _turning_inside(fitted: FittedMap, surface: SurfacePath) -> Turning:
+    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with its nearest twist."""
+    triangles, twist = surface.deformation.faces, surface.turning.twist
+    if not twist.any():
+        return Turning(fitted.turns, np.zeros_like(fitted.turns))
+    centres = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
+    nearest = cKDTree(centres).query(fitted.mesh.centroids)[1]
+    twists = twist[nearest].any(axis=1)
+    swing = np.where(twists[:, None], swing_beside(fitted.turns, twist[nearest]), fitted.turns)
+    return Turning(swing, twist[nearest])

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One piece of work as plain arrays: which keys to go through, which fits are known, which frames are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..collision.colliders import Collider
+from ..errors import naming_pair
+from ..fit.fit_pair import fit_pair
+from ..fit.fitted_map import FittedMap
+from ..fit.storage import from_bytes, to_bytes
+from ..keys.keypair import Ends, KeyPair, consecutive_pairs
+from ..settings import FitOptions, FrameOptions
+from ..support.memory import estimated_mb, require_memory
+from ..support.progress import Steps, numbered
+from .bake import Bake, checked_times
+from .chain import chain_frames
+from .following import Following
+from .modes import needs_fits
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What to compute, checked when it is made.
+
+    Parameters
+    ----------
+    pairs : dict
+        The pair of every two keys that follow each other, by their names.
+    through : tuple of str
+        Names of the keys from the first to the last.
+    fit_options : FitOptions
+    frame_options : FrameOptions
+    times : (k,)
+        Times of the frames, 0 the first key and 1 the last; empty where only the fits are wanted.
+    kept : dict
+        Stored fits, by the names of their keys, that need not be made again.
+    collider : Collider, optional
+        What the frames must not touch, at each of the keys ``through``.
+    """
+
+    pairs: dict[Ends, KeyPair]
+    through: tuple[str, ...]
+    fit_options: FitOptions = field(default_factory=FitOptions)
+    frame_options: FrameOptions = field(default_factory=FrameOptions)
+    times: Floats = field(default_factory=lambda: np.empty(0))
+    kept: dict[Ends, bytes] = field(default_factory=dict)
+    collider: Collider | None = None
+
+    @classmethod
+    def of_keys(
+        cls,
+        shapes: Mapping[str, ArrayLike],
+        faces: ArrayLike,
+        edges: ArrayLike | None,
+        through: Sequence[str],
+        fit_options: FitOptions | None = None,
+        frame_options: FrameOptions | None = None,
+        times: ArrayLike = (),
+        collider: Collider | None = None,
+    ) -> Task:
+        """A task from the shapes (n, 3) of the keys by name, the triangles (m, 3) and the loose edges (e, 2).
+
+        Raises
+        ------
+        InputError
+            If two keys that follow each other cannot be used.
+        """
+        return cls(
+            consecutive_pairs(shapes, faces, edges, through),
+            tuple(through),
+            fit_options or FitOptions(),
+            frame_options or FrameOptions(),
+            np.asarray(times, dtype=np.float64),
+            collider=collider,
+        )
+
+    @property
+    def needs_fits(self) -> bool:
+        """Whether fits are wanted: for frames of all modes but ``straight``, or for themselves."""
+        return needs_fits(self.frame_options.mode) or not len(self.times)
+
+    @property
+    def new_fits(self) -> int:
+        """How many fits of the mesh have to be made."""
+        return len(self.pairs) - len(self.kept) if self.needs_fits else 0
+
+    def require_memory(self, limit_mb: float) -> None:
+        """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
+        vertices = len(next(iter(self.pairs.values())).key0)
+        needed = estimated_mb(vertices, len(self.pairs), len(self.times), self.fit_options.quality, self.needs_fits)
+        if limit_mb:
+            require_memory(needed, limit_mb, vertices)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of a task.
+
+    Parameters
+    ----------
+    fits : dict
+        The stored fit of every pair by the names of its keys; none where the task needs none.
+    bake : Bake or None
+        The frames; None where none were wanted.
+    """
+
+    fits: dict[Ends, bytes]
+    bake: Bake | None
+
+
+def carry_out(task: Task) -> Steps[Outcome]:
+    """Make the fits that are missing, then the frames.
+
+    Raises
+    ------
+    QC3DError
+        If a kept fit is damaged or belongs to other keys, a fit cannot be made, or a time is outside 0..1.
+    """
+    times = checked_times(task.times)  # before the slow part
+    following = None
+    if task.collider is not None and len(times):
+        following = Following(task.collider, times, task.fit_options, task.frame_options)
+    every = task.new_fits + (following.fits if following is not None else 0)
+    fits: dict[Ends, FittedMap] = {}
+    stored: dict[Ends, bytes] = {}
+    made = 0
+    names = list(dict.fromkeys(task.through))
+    for ends, pair in task.pairs.items() if task.needs_fits else ():
+        with naming_pair(*ends, names):
+            data = task.kept.get(ends)
+            if data is None:
+                fits[ends] = yield from numbered(fit_pair(pair, task.fit_options), made, every)
+                data, made = to_bytes(fits[ends]), made + 1
+            else:
+                fits[ends] = from_bytes(data, pair)
+            stored[ends] = data
+    if not len(times):
+        return Outcome(stored, None)
+    collider = None
+    if following is not None:
+        collider = yield from numbered(following.posed(), task.new_fits, every)
+    along = list(pairwise(task.through))
+    frames = chain_frames(
+        [task.pairs[ends] for ends in along], [fits[ends] for ends in along if ends in fits], times, task.frame_options,
+        collider,
+    )
+    bake = yield from numbered(frames, every, every)
+    if following is not None:
+        bake.report.notes += following.notes
+    return Outcome(stored, bake)

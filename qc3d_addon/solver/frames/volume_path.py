@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map of the cube on its way from the identity to the fitted map, rotation kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
+
+from ..arrays import Floats, Ints
+from ..maps.representation import polar_decomposition
+from ..numerics.assembly import StiffnessPattern, stiffness_elements
+from ..numerics.nested_dissection import dissection_order, factored
+from ..numerics.rotation_unwrapping import Turning
+from ..numerics.rotations import products
+from ..numerics.symmetric_matrices import Stretch
+from ..settings import StretchLaw
+from ..support.threads import batches, in_threads
+from ..tets.mesh import TetMesh
+
+_MAPS_AT_ONCE = 4
+
+
+class VolumePath:
+    """Maps between the identity and a fitted map by interpolated rotations and stretches.
+
+    Values minimise ``sum v w |grad f - R_t P_t|^2`` over the tetrahedra with the sliding boundary of the cube, with R_t
+    from ``turning``. The matrix does not depend on the time and is factored once per coordinate.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    maps : (K + 1, N, 3)
+        Maps without folds that were fitted on the way, evenly spaced in time: the identity first, the fitted map last.
+    turning : Turning
+        How the tetrahedra turn.
+    insideness : (M,)
+        What the tetrahedra count besides their volume: most inside the object.
+    law : StretchLaw
+    """
+
+    def __init__(self, mesh: TetMesh, maps: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
+        self._mesh = mesh
+        self._turning = turning
+        self._stretch = Stretch.of(polar_decomposition(mesh.jacobians(maps[-1])).stretch)
+        self._law = law
+        self._weights = mesh.volumes * insideness
+        elements = stiffness_elements(self._weights, mesh.gradients)
+        matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(elements)
+        order = dissection_order(mesh.points, matrix)
+
+        def system(coordinate: int) -> tuple[Ints, SuperLU, Floats]:
+            held = mesh.on_cube_face[:, coordinate]
+            free, resting = order[~held[order]], np.flatnonzero(held)
+            rows = matrix[free]
+            return free, factored(csr_array(rows[:, free])), rows[:, resting] @ mesh.points[resting, coordinate]
+
+        # For each coordinate the vertices that are free to move along it, the factors, and the load of the others.
+        self._systems = list(in_threads(system, range(3)))
+        # (K + 1, N, 3): the fitted maps minus this path.
+        times = batches(np.linspace(0.0, 1.0, len(maps)).tolist(), _MAPS_AT_ONCE)
+        self._missed = maps - np.concatenate(list(in_threads(self.maps_at, times)))
+
+    def at(self, time: float) -> Floats:
+        """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
+        return np.asarray(self.maps_at([time])[0])
+
+    def maps_at(self, times: Sequence[float]) -> Floats:
+        """(k, N, 3) values of the maps at several times, solved together: the factors pass through memory once."""
+        loads = np.stack([self._load(time) for time in times])
+        values = np.tile(self._mesh.points, (len(times), 1, 1))
+        for coordinate, (free, factors, held_load) in enumerate(self._systems):
+            values[:, free, coordinate] = factors.solve((loads[:, free, coordinate] - held_load).T).T
+        return values
+
+    def _load(self, time: float) -> Floats:
+        wanted = products(self._turning.at(time), self._stretch.at(time, self._law))
+        return self._mesh.divergence(self._weights[:, None, None] * wanted)
+
+    def followed(self, time: float, values: Floats) -> Floats:
+        """(N, 3): ``values`` at ``time`` with what this path misses of the nearest fitted maps, before and after."""
+        steps = len(self._missed) - 1
+        before = min(int(time * steps), steps - 1)
+        part = time * steps - before
+        return np.asarray(values + (1.0 - part) * self._missed[before] + part * self._missed[before + 1])

@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a control plays between the shapes that it has: the weight of each shape at every position of the control."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from ..arrays import Floats, Ints
+from ..errors import InputError
+
+# Knots are the cubic spline's own from so many on; through fewer goes one polynomial.
+_LEAST_DISTANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Weights of shapes at knots: piecewise cubic functions of the control's position, one for each shape.
+
+    Function i is 1 at knot i and 0 at all others. All of them add up to 1 everywhere. Before the first knot and beyond
+    the last they go on along their end, in straight lines.
+
+    Parameters
+    ----------
+    knots : (k,)
+        Positions of the shapes, increasing, two or more.
+    slopes : (2, k, k)
+        The slope of function i at knot j, ``slopes[:, j, i]``, just before and just after the knot.
+    """
+
+    knots: Floats
+    slopes: Floats
+
+    @classmethod
+    def smooth(cls, knots: ArrayLike, corners: Sequence[int] = ()) -> Weights:
+        """Cardinal functions of the cubic spline through the knots, "not a knot" at the ends.
+
+        Through three knots that is the parabola, through two the straight line. The spline through the shapes leaves
+        a smooth path of time step h by the order h^4, where straight blends leave it by h^2 (de Boor 1978, *A Practical
+        Guide to Splines*, chapter IV).
+
+        Parameters
+        ----------
+        knots : (k,)
+        corners : sequence of int
+            Numbers of inner knots at which the path turns: splines end there.
+
+        Examples
+        --------
+        >>> Weights.smooth([0.0, 0.5, 1.0]).at([0.25]).round(3)
+        array([[ 0.375,  0.75 , -0.125]])
+        """
+        places = _checked(knots)
+        slopes = np.zeros((2, len(places), len(places)))
+        ends = [0, *sorted(set(corners)), len(places) - 1]
+        for first, last in pairwise(ends):
+            part = slice(first, last + 1)
+            derivative = CubicSpline(places[part], np.eye(last + 1 - first))(places[part], 1)
+            slopes[0, first + 1 : last + 1, part] = derivative[1:]
+            slopes[1, first:last, part] = derivative[:-1]
+        slopes[0, 0], slopes[1, -1] = slopes[1, 0], slopes[0, -1]
+        return cls(places, slopes)
+
+    @classmethod
+    def hats(cls, knots: ArrayLike) -> Weights:
+        """Piecewise linear functions: between two shapes the control plays their straight blend.
+
+        Examples
+        --------
+        >>> Weights.hats([0.0, 0.5, 1.0]).at([0.25])
+        array([[0.5, 0.5, 0. ]])
+        """
+        places = _checked(knots)
+        return cls.smooth(places, range(1, len(places) - 1))
+
+    def at(self, positions: ArrayLike) -> Floats:
+        """(p, k) weights at positions (p,) of the control."""
+        wanted = np.atleast_1d(np.asarray(positions, dtype=np.float64))
+        knots, count = self.knots, len(self.knots)
+        before = np.clip(np.searchsorted(knots, wanted, side="right") - 1, 0, count - 2)
+        width = (knots[before + 1] - knots[before])[:, None]
+        part = np.clip((wanted - knots[before])[:, None] / width, 0.0, 1.0)
+        values, rest = np.eye(count), 1.0 - part
+        # Hermite's basis.
+        found = rest * rest * (1.0 + 2.0 * part) * values[before]
+        found += part * part * (1.0 + 2.0 * rest) * values[before + 1]
+        found += width * part * rest * (rest * self.slopes[1, before] - part * self.slopes[0, before + 1])
+        found += np.minimum(wanted - knots[0], 0.0)[:, None] * self.slopes[1, 0]
+        found += np.maximum(wanted - knots[-1], 0.0)[:, None] * self.slopes[0, -1]
+        return np.asarray(found)
+
+    def played(self, shapes: Floats, positions: ArrayLike) -> Floats:
+        """(p, n, 3) what the control plays at positions (p,), from the shapes (k, n, 3) at its knots."""
+        return np.tensordot(self.at(positions), shapes, axes=1)
+
+
+def fewest_knots(
+    times: Floats, frames: Floats, tolerance: float, required: Sequence[int] = (), corners: Sequence[int] = ()
+) -> Ints:
+    """As few knots, not always even, as play all frames within a tolerance with smooth weights.
+
+    Parameters
+    ----------
+    times : (d,)
+        Of the frames, increasing.
+    frames : (d, n, 3)
+        Frames of the whole motion, dense enough to stand for all of it.
+    tolerance
+        How far a vertex may be from where its frame has it, in the unit of the frames.
+    required : sequence of int
+        Frames that are knots in any case, such as those at keys; the first and the last always are.
+    corners : sequence of int
+        Of those, the frames at which the path turns.
+
+    Returns
+    -------
+    (k,) numbers of the frames that are knots, sorted; all of them where no fewer are enough.
+
+    Notes
+    -----
+    Knots are added where the path is farthest from its frames; then fewer are tried where the path bends most evenly
+    between them, with a density that follows the fourth root of its fourth derivative (de Boor 1978, chapter XII).
+    """
+    fixed = sorted({0, *required, *corners, len(times) - 1})
+    greedy = list(fixed)
+    while (missed := _missed(times, frames, greedy, corners)).max() > tolerance and len(greedy) < len(times):
+        greedy = sorted({*greedy, int(missed.argmax())})
+    bends = _bends(times, frames, fixed)
+    for count in range(len(fixed), len(greedy)):
+        placed = _placed(bends, fixed, count)
+        if len(placed) == count and _missed(times, frames, placed, corners).max() <= tolerance:
+            return np.array(placed, dtype=np.int64)
+    return np.array(greedy, dtype=np.int64)
+
+
+def _checked(knots: ArrayLike) -> Floats:
+    places = np.asarray(knots, dtype=np.float64)
+    if places.ndim != 1 or len(places) < 2 or not (np.diff(places) > _LEAST_DISTANCE).all():
+        raise InputError("The positions of the shapes must be two or more different numbers in increasing order.")
+    return places
+
+
+def _missed(times: Floats, frames: Floats, knots: Sequence[int], corners: Sequence[int]) -> Floats:
+    """(d,) how far the smooth path through the knots is from each frame; 0 at the knots."""
+    weights = Weights.smooth(times[list(knots)], [knots.index(corner) for corner in corners])
+    missed = np.linalg.norm(weights.played(frames[list(knots)], times) - frames, axis=2).max(axis=1, initial=0.0)
+    missed[list(knots)] = 0.0
+    return np.asarray(missed)
+
+
+def _bends(times: Floats, frames: Floats, fixed: Sequence[int]) -> Floats:
+    """(d,) how many knots the path wants up to each frame, in a unit of no meaning."""
+    density = np.zeros(len(times))
+    for first, last in pairwise(fixed):
+        flat = frames[first : last + 1].reshape(last + 1 - first, -1)
+        if len(flat) > 4:
+            for _ in range(4):
+                flat = np.gradient(flat, axis=0)
+            density[first : last + 1] += np.abs(flat).max(axis=1, initial=0.0) ** 0.25
+    density += 1e-3 * (density.mean() or 1.0)
+    return np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(times))])
+
+
+def _placed(bends: Floats, fixed: Sequence[int], count: int) -> list[int]:
+    """About ``count`` knots, the fixed ones among them, at even steps of ``bends``."""
+    free = count - len(fixed)
+    wanted = bends[-1] * np.arange(1, free + 1) / (free + 1)
+    return sorted({*fixed, *np.abs(bends[:, None] - wanted).argmin(axis=0).tolist()} if free else {*fixed})

@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The input of the solver: two keys of one mesh, checked once on the way in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, Ints
+from ..errors import InputError, naming_pair
+from ..triangles.topology import welded
+
+# The names of the first and the second key of a pair.
+Ends = tuple[str, str]
+
+# Cubes of what lies between, and squares of its areas, still are numbers.
+_SMALLEST, LARGEST = 1e-75, 1e75
+_MOST_GROWTH = 1e10
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPair:
+    """Two shapes of one mesh. Build it with ``KeyPair.checked``, which validates.
+
+    Parameters
+    ----------
+    key0, key1 : (n, 3) float64
+        Vertex positions of the first and the second key, in the object's own units.
+    faces : (m, 3) int64
+        Triangles (polygons are triangulated before they come here); may be empty.
+    edges : (e, 2) int64
+        Edges to keep together that belong to no face; may be empty.
+    """
+
+    key0: Floats
+    key1: Floats
+    faces: Ints
+    edges: Ints
+
+    @classmethod
+    def checked(cls, key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None) -> KeyPair:
+        """Validate the arrays and make a pair of them.
+
+        Raises
+        ------
+        InputError
+            If shapes disagree, a coordinate is not finite, an index is out of range, there are fewer than four
+            vertices, all vertices of a key lie in one plane, line or point, or sizes are beyond all reason.
+        """
+        first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
+        if first.shape != second.shape:
+            raise InputError(
+                f"The keys have {len(first)} and {len(second)} vertices; both must be shapes of the same mesh."
+            )
+        if len(first) < 4:
+            raise InputError(f"The mesh has {len(first)} vertices; at least 4 are needed to span a volume.")
+        for key, name in ((first, "first"), (second, "second")):
+            _require_volume(key, name)
+        _require_like_sizes(first, second)
+        triangles = _indices(faces, 3, len(first), "faces")
+        wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
+        return cls(first, second, triangles, wires)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the first key's bounding-box diagonal, the unit of relative errors."""
+        return float(np.linalg.norm(np.ptp(self.key0, axis=0)))
+
+    @cached_property
+    def welding(self) -> tuple[Ints, Ints]:
+        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,)."""
+        return welded(self.key0, self.key1)
+
+
+def consecutive_pairs(
+    shapes: Mapping[str, ArrayLike], faces: ArrayLike, edges: ArrayLike | None, through: Sequence[str]
+) -> dict[Ends, KeyPair]:
+    """The pair of every two keys that follow each other, by their names; one that comes again is made once.
+
+    Parameters
+    ----------
+    shapes : dict of (n, 3)
+        Shapes of one mesh by name.
+    faces, edges : (m, 3), (e, 2)
+        See ``KeyPair``.
+    through : sequence of str
+        Names of the keys from the first to the last.
+
+    Raises
+    ------
+    InputError
+        If two keys that follow each other are one and the same, or cannot be used.
+    """
+    pairs: dict[Ends, KeyPair] = {}
+    for first, second in pairwise(through):
+        if first == second and len(through) == 2:
+            raise InputError(f"The first and the second key are both {first!r}; choose two different keys.")
+        if first == second:
+            raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
+        if (first, second) not in pairs:
+            with naming_pair(first, second, through):
+                pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges)
+    return pairs
+
+
+def _positions(key: ArrayLike, name: str) -> Floats:
+    try:
+        given = np.asarray(key)
+        positions = np.array(given, dtype=np.float64) if given.dtype.kind in "fiuO" else None
+    except (TypeError, ValueError, OverflowError):
+        positions = None
+    if positions is None:
+        raise InputError(f"The {name} key does not hold numbers; positions must be an (n, 3) array of them.")
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise InputError(f"The {name} key has shape {positions.shape}; positions must be an (n, 3) array.")
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if bad.size:
+        raise InputError(
+            f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
+            f"({bad.size} such vertices); repair the key first."
+        )
+    largest = float(np.abs(positions).max(initial=0.0))
+    if largest > LARGEST:
+        raise InputError(f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {LARGEST:.0e}.")
+    return positions
+
+
+def _require_volume(key: Floats, name: str) -> None:
+    spread = key - key.mean(axis=0)
+    size = np.abs(spread).max()
+    if 0.0 < size < _SMALLEST:
+        raise InputError(f"The {name} key is only {size:.0e} in size; scale the mesh to above {_SMALLEST:.0e}.")
+    thickness = 0.0 if size == 0.0 else np.linalg.svd(spread / size, compute_uv=False)[-1] / np.sqrt(len(key))
+    if thickness < 1e-9:
+        raise InputError(
+            f"All vertices of the {name} key lie in one plane, line or point; "
+            "in-betweens need a key that spans a volume."
+        )
+
+
+def _require_like_sizes(first: Floats, second: Floats) -> None:
+    ratio = float(np.ptp(second, axis=0).max() / np.ptp(first, axis=0).max())
+    if not 1.0 / _MOST_GROWTH <= ratio <= _MOST_GROWTH:
+        raise InputError(
+            f"The second key is {ratio:.0e} times as large as the first, more than numbers can hold; "
+            "bring both keys to like sizes."
+        )
+
+
+def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:
+    try:
+        indices = np.array(values)
+    except ValueError as error:
+        raise InputError(f"{name} has rows of different lengths; it must be an (m, {width}) array.") from error
+    if indices.ndim != 2 or indices.shape[1] != width:
+        raise InputError(f"{name} has shape {indices.shape}; it must be an (m, {width}) array of vertex indices.")
+    if indices.size and indices.dtype.kind not in "iu":
+        raise InputError(f"{name} holds {indices.dtype} values; vertex indices must be integers.")
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        raise InputError(f"{name} refers to a vertex outside 0..{count - 1}.")
+    return np.ascontiguousarray(indices, dtype=np.int64)

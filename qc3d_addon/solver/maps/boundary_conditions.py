@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a map is given when it is rebuilt: boundary conditions and landmarks, each coordinate by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import InputError, ReconstructionError
+from ..tets.mesh import TetMesh
+
+_COORDINATES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Which coordinates of the map are given, and what they are.
+
+    Parameters
+    ----------
+    held : (N, 3) bool
+        Whether a coordinate of a vertex's image is given.
+    values : (N, 3)
+        The given ones; the others are not looked at.
+    """
+
+    held: Bools
+    values: Floats
+
+    @classmethod
+    def none(cls, mesh: TetMesh) -> Conditions:
+        """Nothing is given yet."""
+        return cls(np.zeros(mesh.points.shape, dtype=bool), np.array(mesh.points))
+
+    @classmethod
+    def sliding_cube(cls, mesh: TetMesh) -> Conditions:
+        """Every face of the unit cube slides within itself: u is given on x = 0 and 1, v on y, w on z (section 3.3).
+
+        Raises
+        ------
+        ReconstructionError
+            If the mesh does not fill the unit cube.
+        """
+        on_faces = mesh.on_cube_face
+        if not on_faces[mesh.boundary_faces].all(axis=1).any(axis=1).all():
+            raise ReconstructionError(
+                "The mesh does not fill the unit cube, so its boundary cannot slide; hold the boundary instead."
+            )
+        return cls(np.array(on_faces), np.array(mesh.points))
+
+    @classmethod
+    def fixed_boundary(cls, mesh: TetMesh, values: Floats) -> Conditions:
+        """All three coordinates are given at every vertex of the boundary, as in ``values`` (N, 3)."""
+        held = np.zeros(mesh.points.shape, dtype=bool)
+        held[np.unique(mesh.boundary_faces)] = True
+        return cls(held, np.array(values))
+
+    def with_landmarks(self, vertices: ArrayLike, values: ArrayLike) -> Conditions:
+        """These conditions and landmarks, which count where both give a coordinate.
+
+        Parameters
+        ----------
+        vertices : (k,)
+            Numbers of the landmarks' vertices, from 0.
+        values : (k, 3)
+            Their images; NaN leaves a coordinate as it is without the landmark.
+
+        Raises
+        ------
+        InputError
+            If a landmark is no vertex or comes twice, or the arrays do not belong together.
+        """
+        rows, wanted = np.asarray(vertices), np.asarray(values, dtype=np.float64)
+        if rows.ndim != 1 or rows.dtype.kind not in "iu" or wanted.shape != (len(rows), 3):
+            raise InputError("Landmarks are a list of vertex numbers (k,) and their images (k, 3).")
+        if np.isinf(wanted).any():
+            raise InputError("The image of a landmark is infinite; give a number, or leave the coordinate out.")
+        if len(rows) and (rows.min() < 0 or rows.max() >= len(self.held)):
+            raise InputError(f"A landmark is no vertex of the mesh; they are numbered 0 to {len(self.held) - 1}.")
+        if len(np.unique(rows)) != len(rows):
+            raise InputError("A vertex is a landmark twice; name each once.")
+        held, merged = np.array(self.held), np.array(self.values)
+        given = np.isfinite(wanted)
+        held[rows] |= given
+        merged[rows] = np.where(given, wanted, merged[rows])
+        return Conditions(held, merged)
+
+    def require_enough(self, mesh: TetMesh) -> None:
+        """Raise ReconstructionError unless every connected part of the mesh is held so that it cannot become flat.
+
+        A coordinate that is given nowhere has no solution; one that is given a single value everywhere is constant.
+        """
+        part, count = _parts(mesh)
+        for coordinate, name in enumerate(_COORDINATES):
+            held = self.held[:, coordinate] & (part >= 0)
+            given, owners = self.values[held, coordinate], part[held]
+            lowest, highest = np.full(count, np.inf), np.full(count, -np.inf)
+            np.minimum.at(lowest, owners, given)
+            np.maximum.at(highest, owners, given)
+            missing = np.flatnonzero(np.bincount(owners, minlength=count) == 0)
+            if missing.size:
+                where = "nowhere" if count == 1 else f"nowhere on {missing.size} of the mesh's {count} parts"
+                raise ReconstructionError(
+                    f"The coordinate {name} of the map is held {where}; give boundary values or landmarks for it."
+                )
+            if not (highest > lowest).all():
+                raise ReconstructionError(
+                    f"The coordinate {name} of the map has one value wherever it is held, which makes the map flat; "
+                    "hold it at two values or more."
+                )
+
+
+def _parts(mesh: TetMesh) -> tuple[Ints, int]:
+    """The connected part of each vertex, -1 for vertices of no tetrahedron, and the number of parts."""
+    count = len(mesh.points)
+    rows, columns = np.repeat(mesh.tets[:, 0], 3), mesh.tets[:, 1:].ravel()
+    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    _, labels = connected_components(graph, directed=False)
+    used = np.zeros(count, dtype=bool)
+    used[mesh.tets] = True
+    part = np.full(count, -1, dtype=np.int64)
+    known, part[used] = np.unique(labels[used], return_inverse=True)
+    return part, len(known)

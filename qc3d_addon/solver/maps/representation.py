@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The 3D quasiconformal representation of a map: the symmetric stretch of its Jacobian on every tetrahedron.
+
+Chen & Lui, "A Novel 3D Mapping Representation and its Applications", section 3: J = R P with P symmetric positive
+definite. P has six numbers per tetrahedron, written either as its upper triangle or as three eigenvalues and the
+Euler angles of its eigenvectors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import ReconstructionError
+from ..numerics.rotations import closest_rotations, cofactors, determinants
+
+# Order of the six numbers of a symmetric matrix: xx, xy, xz, yy, yz, zz.
+_ROWS, _COLUMNS = np.triu_indices(3)
+
+
+class Polar(NamedTuple):
+    """J = rotation @ stretch, per element: two (M, 3, 3) arrays."""
+
+    rotation: Floats
+    stretch: Floats
+
+
+def polar_decomposition(jacobians: Floats) -> Polar:
+    """Split Jacobians (M, 3, 3) into a rotation and a symmetric stretch.
+
+    Where det J > 0 the stretch is positive definite; where an element is folded its smallest eigenvalue is negative.
+    """
+    rotation = closest_rotations(jacobians)
+    stretch = rotation.transpose(0, 2, 1) @ jacobians
+    return Polar(rotation, 0.5 * (stretch + stretch.transpose(0, 2, 1)))
+
+
+def upper_triangle(stretch: Floats) -> Floats:
+    """(M, 6) upper triangles xx, xy, xz, yy, yz, zz of symmetric matrices (M, 3, 3): the first six-number form."""
+    return stretch[:, _ROWS, _COLUMNS]
+
+
+def from_upper_triangle(numbers: Floats) -> Floats:
+    """(M, 3, 3) symmetric matrices from the first six-number form (M, 6)."""
+    stretch = np.empty((len(numbers), 3, 3))
+    stretch[:, _ROWS, _COLUMNS] = numbers
+    stretch[:, _COLUMNS, _ROWS] = numbers
+    return stretch
+
+
+def eigen_form(stretch: Floats) -> Floats:
+    """(M, 6): eigenvalues a >= b >= c and Euler angles of the eigenvectors: the second six-number form.
+
+    P = W diag(a, b, c) W^T with W = Rz(alpha) Ry(beta) Rx(gamma) a rotation, angles in radians, alpha and gamma in
+    [-pi, pi], beta in [-pi/2, pi/2]. Where W has determinant -1 its last column is flipped, which leaves P as it is.
+    """
+    values, vectors = np.linalg.eigh(stretch)
+    values, vectors = values[:, ::-1], vectors[:, :, ::-1].copy()
+    vectors[:, :, 2] *= np.sign(np.linalg.det(vectors))[:, None]
+    alpha = np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])
+    beta = np.arctan2(-vectors[:, 2, 0], np.hypot(vectors[:, 0, 0], vectors[:, 1, 0]))
+    # Gamma is read off Rz(-alpha) W: near beta = +-pi/2 alpha is arbitrary, and gamma makes up for whatever it is.
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    gamma = np.arctan2(
+        sine * vectors[:, 0, 2] - cosine * vectors[:, 1, 2], cosine * vectors[:, 1, 1] - sine * vectors[:, 0, 1]
+    )
+    return np.column_stack([values, alpha, beta, gamma])
+
+
+def from_eigen_form(numbers: Floats) -> Floats:
+    """(M, 3, 3) symmetric matrices from the second six-number form (M, 6)."""
+    cosine, sine = np.cos(numbers[:, 3:]).T, np.sin(numbers[:, 3:]).T
+    (ca, cb, cg), (sa, sb, sg) = cosine, sine
+    vectors = np.empty((len(numbers), 3, 3))
+    vectors[:, 0] = np.column_stack([ca * cb, ca * sb * sg - sa * cg, ca * sb * cg + sa * sg])
+    vectors[:, 1] = np.column_stack([sa * cb, sa * sb * sg + ca * cg, sa * sb * cg - ca * sg])
+    vectors[:, 2] = np.column_stack([-sb, cb * sg, cb * cg])
+    product = (vectors * numbers[:, None, :3]) @ vectors.transpose(0, 2, 1)
+    return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))  # symmetric to the last bit
+
+
+def conductivity(stretch: Floats) -> Floats:
+    """(M, 3, 3) matrices A = det(P) P^-2 of the generalised Laplace equation (Chen & Lui, section 3.2).
+
+    Since P^-1 = cof(P) / det(P) for a symmetric P, A = cof(P)^2 / det(P).
+
+    Raises
+    ------
+    ReconstructionError
+        If a stretch is not positive definite: such an element is folded or collapsed.
+    """
+    determinant = determinants(stretch)
+    trace = np.einsum("kii->k", stretch)
+    cofactor = cofactors(stretch)
+    minors = np.einsum("kii->k", cofactor)
+    # The three invariants of a symmetric matrix are all positive exactly if its eigenvalues are.
+    bad = np.flatnonzero(~((determinant > 0.0) & (trace > 0.0) & (minors > 0.0)))
+    if bad.size:
+        raise ReconstructionError(
+            f"The stretch of {bad.size} tetrahedra, first number {bad[0]}, is not positive definite; "
+            "a map can be rebuilt only from a representation without folds."
+        )
+    return np.asarray(cofactor @ cofactor / determinant[:, None, None])

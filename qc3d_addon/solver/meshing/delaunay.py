@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshing engine without compiled dependencies: graded samples of the cube and their Delaunay tetrahedra."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..tets.mesh import TetMesh
+from .poisson_disk import Resolution, sample_cube, sample_surface
+from .slivers import sliver_free
+
+
+def delaunay_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int) -> TetMesh:
+    """Fill the cube; repeatable: the same input and seed give the same mesh.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Vertices strictly inside the cube.
+    faces : (m, 3) int64
+        Triangles, in any state; may be empty.
+    resolution : Resolution
+    seed : int
+    """
+    rng = np.random.default_rng(seed)
+    surface = sample_surface(points, faces, resolution.spacing, rng)
+    size = resolution.around(surface)
+    return sliver_free(sample_cube(surface, size, rng), size, rng)

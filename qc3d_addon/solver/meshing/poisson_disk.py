@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Graded Poisson-disk samples of the cube: dense near the surface, thinned with the distance from it.
+
+Follows the sampling of Chen & Lui (arXiv 2308.05333, section 4): samples too close to one another, the surface's
+included, are dropped by a threshold that grows with the distance from the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from scipy.spatial import cKDTree
+
+from ..arrays import Bools, Floats, Ints
+from ..settings import Quality
+from ..triangles.geometry import areas
+
+SizeField = Callable[[Floats], Floats]
+
+_OVERSAMPLING = 4.0  # candidates per disk: enough that few holes are left between the disks
+_NEIGHBOURS = 16
+_MOST_CANDIDATES = 500_000  # on surfaces folded so densely that more would lie in the disks of others
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Distance between samples: ``spacing`` at the surface, growing with the distance from it up to ``largest``.
+
+    Parameters
+    ----------
+    spacing, largest : float
+        Cube units.
+    slope : float
+        Growth per unit of distance from the surface.
+    """
+
+    spacing: float
+    slope: float
+    largest: float
+
+    def around(self, surface: Floats) -> SizeField:
+        """The distance between samples as a function of position, for a surface given by points (k, 3)."""
+        tree = cKDTree(surface)
+
+        def size(positions: Floats) -> Floats:
+            distance: Floats = np.asarray(tree.query(positions)[0])
+            return np.minimum(self.spacing + self.slope * distance, self.largest, dtype=np.float64)
+
+        return size
+
+
+RESOLUTIONS: dict[Quality, Resolution] = {
+    "normal": Resolution(spacing=0.03, slope=0.3, largest=0.12),
+    "fine": Resolution(spacing=0.02, slope=0.25, largest=0.1),
+    "finest": Resolution(spacing=0.014, slope=0.25, largest=0.08),
+}
+
+
+def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools:
+    """Choose a maximal subset of ``candidates`` that respects their disks; earlier candidates have precedence.
+
+    Parameters
+    ----------
+    candidates : (n, 3) float64
+    radii : (n,) float64
+        A candidate is chosen only if no point chosen before it is nearer than its radius.
+    kept : (k, 3) float64, optional
+        Points chosen already.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    chosen = np.zeros(len(candidates), dtype=bool)
+    open_ = np.arange(len(candidates))
+    if kept is not None and len(kept):
+        open_ = open_[cKDTree(kept).query(candidates)[0] >= radii]
+    while open_.size:
+        # A candidate wins the round when no earlier neighbour is inside its disk; the first always wins.
+        distance, neighbour = cKDTree(candidates[open_]).query(candidates[open_], k=min(_NEIGHBOURS, open_.size))
+        distance, neighbour = np.reshape(distance, (open_.size, -1)), np.reshape(neighbour, (open_.size, -1))
+        order = np.arange(open_.size)
+        wins = ~((distance < radii[open_, None]) & (neighbour < order[:, None])).any(axis=1)
+        if not wins.all():
+            # Where more candidates crowd in a disk than neighbours are looked at, winners may still be in conflict.
+            wins[wins] = thin(candidates[open_[wins]], radii[open_[wins]])
+        chosen[open_[wins]] = True
+        winners = candidates[open_[wins]]
+        rest = open_[~wins]
+        open_ = rest[cKDTree(winners).query(candidates[rest])[0] >= radii[rest]] if rest.size else rest
+    return chosen
+
+
+def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) -> Floats:
+    """Poisson-disk samples (k, 3) of the triangles and of the vertices, about ``spacing`` apart."""
+    corners = points[faces]
+    sizes = areas(points, faces)
+    total = float(sizes.sum())
+    count = min(int(np.ceil(_OVERSAMPLING * total / spacing**2)), _MOST_CANDIDATES)
+    samples = np.empty((0, 3))
+    if count:
+        triangle = rng.choice(len(faces), size=count, p=sizes / total)
+        weights = rng.dirichlet((1.0, 1.0, 1.0), size=count)
+        samples = np.einsum("nk,nka->na", weights, corners[triangle])
+        samples = samples[thin(samples, np.full(count, spacing))]
+    vertices = rng.permutation(points)
+    apart: Floats = vertices[thin(vertices, np.full(len(vertices), spacing), samples)]
+    return np.concatenate([samples, apart])
+
+
+def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
+    """Fill the cube around the surface's samples: its corners, edges, faces and inside, thinned by ``size``.
+
+    Parameters
+    ----------
+    surface : (k, 3) float64
+        Samples of the surface, strictly inside the cube; they are kept.
+    size : callable
+        Target distance between samples at positions (n, 3).
+
+    Returns
+    -------
+    (n, 3) float64
+        All samples; those on the cube's faces have coordinates that are exactly 0 or 1.
+    """
+    samples: Floats = np.concatenate([_corners(), surface])
+    for dimension in (1, 2, 3):
+        candidates = _candidates(dimension, size, rng)
+        radii = size(candidates)
+        # What is not on the cube's faces keeps its distance from them, or flat tetrahedra would line them.
+        gap = np.minimum(candidates, 1.0 - candidates)
+        free = ((gap == 0.0) | (gap >= 0.6 * radii[:, None])).all(axis=1)
+        candidates, radii = candidates[free], radii[free]
+        samples = np.concatenate([samples, candidates[thin(candidates, radii, samples)]])
+    return samples
+
+
+def _corners() -> Floats:
+    return _lattice(np.array([0.0, 1.0]), 3)
+
+
+def _lattice(ticks: Floats, dimension: int) -> Floats:
+    lattice: Floats = np.stack(np.meshgrid(*[ticks] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
+    return lattice
+
+
+def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
+    """Random points on the cube's edges (1), faces (2) or inside (3), as dense as ``size`` asks, in random order."""
+    cells = 32
+    lattice = _lattice(np.arange(cells) / cells, dimension)
+    parts = []
+    for free, fixed in _pieces(dimension):
+        origin = np.broadcast_to(fixed, (len(lattice), 3)).copy()
+        origin[:, free] = lattice
+        middle = origin.copy()
+        middle[:, free] += 0.5 / cells
+        expected = _OVERSAMPLING * (1.0 / cells / size(middle)) ** dimension
+        count = np.floor(expected + rng.random(len(expected))).astype(np.int64)
+        points = np.repeat(origin, count, axis=0)
+        points[:, free] += rng.random((len(points), dimension)) / cells
+        parts.append(points)
+    candidates: Floats = np.concatenate(parts)
+    return rng.permutation(candidates)
+
+
+def _pieces(dimension: int) -> list[tuple[list[int], Floats]]:
+    """The cube's edges, faces or inside: its free axes, and the coordinates of the fixed ones."""
+    pieces = []
+    for corner in _corners():
+        for free in ([0], [1], [2]) if dimension == 1 else ([0, 1], [0, 2], [1, 2]) if dimension == 2 else ([0, 1, 2],):
+            if not corner[free].any():
+                pieces.append((free, corner))
+    return pieces

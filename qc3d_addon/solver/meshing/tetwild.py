@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshing engine fTetWild (Hu et al. 2020, *Fast tetrahedral meshing in the wild*), run in a child process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import MeshingError
+from ..numerics.grouped_sums import means_by_label
+from ..support.private_folders import PrivateFolder
+from ..tets.mesh import TetMesh
+from .poisson_disk import RESOLUTIONS, Resolution, sample_cube, sample_surface
+from .slivers import triangulate
+from .tetwild_loading import load_command, unavailable_reason
+
+MARGIN = 0.14  # the surface keeps this far from the cube's faces; also the longest edge that fTetWild aims at
+
+_EDGE_FACTOR = 1.6  # fTetWild's ideal edges per distance between Poisson-disk samples, for equally fine meshes
+
+
+def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int, time_limit: float) -> TetMesh:
+    """Fill the cube. Not repeatable: fTetWild gives another mesh at every call.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Vertices inside [0.14, 0.86]³.
+    faces : (m, 3) int64
+        Triangles, in any state.
+    resolution : Resolution
+    seed : int
+        Of the samples that carry the size field.
+    time_limit : float
+        Seconds after which the child process is killed.
+
+    Raises
+    ------
+    MeshingError
+        If fTetWild is not available, has no triangle to work on, fails, crashes or exceeds the limit.
+    """
+    vertices, triangles = cluster(points, faces, 0.75 * resolution.spacing)
+    if not len(triangles):
+        raise MeshingError("The meshing engine tetwild needs triangles, and the mesh has none that it could use.")
+    rng = np.random.default_rng(seed)
+    coarse = RESOLUTIONS["normal"]
+    surface = sample_surface(points, faces, coarse.spacing, rng)
+    samples = sample_cube(surface, coarse.around(surface), rng)
+    background = TetMesh(samples, triangulate(samples))
+    # fTetWild works in the bounding box of all its vertices, grown by the edge length on every side. With the two
+    # vertices that no triangle uses this box is the unit cube, exactly.
+    inner = np.array([[MARGIN] * 3, [1.0 - MARGIN] * 3])
+    diagonal = float(np.linalg.norm(inner[1] - inner[0]))
+    arrays = {
+        "points": np.concatenate([vertices, inner]),
+        "faces": triangles,
+        "edge_length": np.array(MARGIN),
+        "epsilon": np.array(0.7 * resolution.spacing / diagonal),
+        "size_points": samples,
+        "size_tets": background.tets[background.volumes > 1e-10],  # fTetWild interpolates in them
+        "size_values": _EDGE_FACTOR * resolution.around(surface)(samples),
+    }
+    positions, tets = run_child(arrays, time_limit)
+    for exact in (0.0, 1.0):
+        positions[np.abs(positions - exact) < 1e-9] = exact
+    # The two vertices come back without tetrahedra: equations on the mesh would be singular there.
+    used, corners = np.unique(tets, return_inverse=True)
+    return TetMesh(positions[used], corners.reshape(-1, 4).astype(np.int64))
+
+
+def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:
+    """Coarsen a triangle mesh: the vertices of one cell of a regular grid become one, triangles that collapse go.
+
+    The volume is coarser than the surface, and fTetWild's running time follows the surface it is given.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    faces : (m, 3) int64
+    cell : float
+        Edge length of the grid's cells.
+
+    Returns
+    -------
+    (k, 3) float64 and (l, 3) int64
+        Vertices in use (means of their cells) and distinct triangles of three distinct vertices.
+    """
+    used, corners = np.unique(faces, return_inverse=True)
+    _, cell_of = np.unique(np.floor(points[used] / cell).astype(np.int64), axis=0, return_inverse=True)
+    cell_of = cell_of.reshape(-1)
+    means = means_by_label(cell_of, points[used])
+    merged = np.sort(cell_of[corners.reshape(-1, 3)], axis=1)
+    merged = merged[(merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2])]
+    kept, triangles = np.unique(np.unique(merged, axis=0), return_inverse=True)
+    return means[kept], triangles.reshape(-1, 3)
+
+
+def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floats, Ints]:
+    """Run the child program on ``arrays``; return positions (N, 3) and tetrahedra (M, 4).
+
+    Raises
+    ------
+    MeshingError
+        Whatever way the child failed.
+    """
+    reason = unavailable_reason()
+    if reason is not None:
+        raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}.")
+    with PrivateFolder() as folder:
+        for key, array in arrays.items():
+            np.save(folder / f"{key}.npy", array, allow_pickle=False)
+        command = [*load_command(), str(folder), str(time_limit)]
+        status, message = _run(command, folder / "errors.txt", time_limit)
+        if status is None:
+            raise MeshingError(
+                f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
+                "allow it more, or choose a lower quality or the engine delaunay."
+            )
+        output = folder / "output.npz"
+        if status != 0 or not output.exists():
+            how = f" with an error: {message}." if message else f" without a mesh (exit status {status})."
+            raise MeshingError(f"The meshing engine tetwild ended{how}")
+        try:
+            with np.load(output, allow_pickle=False) as archive:
+                return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
+        except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
+            raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
+
+
+def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
+    """Exit status (None: killed at the time limit) and the last line written to standard error."""
+    # In the group of whoever waits for it: what ends that group, such as Ctrl-C or a cancelled bake, ends this too.
+    flags = 0
+    if sys.platform == "win32":
+        flags = subprocess.CREATE_NO_WINDOW
+    with open(errors, "wb") as stream:
+        process = subprocess.Popen(
+            command,
+            cwd=errors.parent,  # fTetWild writes files of its own where it runs
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=stream,
+            creationflags=flags,
+        )
+        try:
+            status = process.wait(time_limit)
+        except subprocess.TimeoutExpired:
+            status = None
+        finally:  # also when the user interrupts the wait
+            process.kill()
+            process.wait()
+    lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return status, lines[-1] if lines else ""

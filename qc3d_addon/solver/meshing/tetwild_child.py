@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run fTetWild once: the only code that touches pytetwild.
+
+A process of its own, because pytetwild keeps the interpreter locked while it works, cannot be cancelled, removes the
+interrupt handler, and may exit or crash from C++. Started by :mod:`qc3d_addon.solver.meshing.tetwild`, which says
+what the files hold::
+
+    python -I tetwild_child.py WRAPPER NUMPY FOLDER SECONDS
+
+WRAPPER is the file of pytetwild's compiled module, loaded on its own because the package around it needs pyvista;
+NUMPY is the folder that holds numpy; FOLDER is where the input's .npy files lie and ``output.npz`` goes; SECONDS is
+a limit that holds even if nobody is left to enforce it. Without FOLDER and SECONDS it loads the module and no more.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import signal
+import sys
+from pathlib import Path
+from types import ModuleType
+
+
+def main(arguments: list[str]) -> None:
+    wrapper, numpy_folder = Path(arguments[0]), arguments[1]
+    sys.path.append(numpy_folder)
+    if len(arguments) == 2:
+        _load(wrapper)
+        return
+    folder, seconds = Path(arguments[2]), float(arguments[3])
+    if hasattr(signal, "alarm"):
+        signal.alarm(math.ceil(seconds) + 5)
+    import numpy as np
+
+    arrays = {file.stem: np.load(file, allow_pickle=False) for file in folder.glob("*.npy")}
+    # The compiled function takes its arguments by position only; the comments are the names pytetwild gives them.
+    points, tets = _load(wrapper).tetrahedralize_mesh(
+        arrays["points"],
+        arrays["faces"].astype(np.uint32),
+        True,  # optimize
+        True,  # skip_simplify: the surface comes simplified, and simplifying drops the vertices that set the box
+        0.05,  # edge_length_r, unused because edge_length_abs is given
+        float(arrays["edge_length"]),  # edge_length_abs
+        float(arrays["epsilon"]),
+        10.0,  # stop_energy
+        False,  # coarsen
+        0,  # num_threads: all
+        80,  # num_opt_iter
+        6,  # loglevel
+        True,  # quiet
+        True,  # vtk_ordering: positive orientation
+        True,  # disable_filtering: keep the whole box
+        arrays["size_points"],
+        arrays["size_tets"].astype(np.int32),
+        arrays["size_values"],
+    )
+    # Renamed when complete: a crash while writing must not look like a result.
+    np.savez(folder / "unfinished.npz", points=points, tets=tets)
+    os.replace(folder / "unfinished.npz", folder / "output.npz")
+
+
+def _load(wrapper: Path) -> ModuleType:
+    libraries = wrapper.parent.parent / "pytetwild.libs"
+    if sys.platform == "win32" and libraries.is_dir():
+        os.add_dll_directory(str(libraries))  # as the package's own __init__ does on Windows
+    spec = importlib.util.spec_from_file_location("PyfTetWildWrapper", wrapper)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{wrapper} is not an extension module")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except Exception as error:
+        sys.exit(f"{type(error).__name__}: {error}".splitlines()[0])

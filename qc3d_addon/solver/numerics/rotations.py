@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rotations of 3-space in batches: closest rotation, rotation vectors and back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+
+_NEWTON_STEPS = 20
+_SMALL_ANGLE = 1e-4
+_NO_ANGLE = 1e-12  # below this the axis is lost to rounding
+
+
+def by_component(matrices: Floats) -> Floats:
+    """The same array (k, ...), each component stored in one piece: operations on all k run along memory."""
+    return np.asarray(np.moveaxis(np.ascontiguousarray(np.moveaxis(matrices, 0, -1)), -1, 0))
+
+
+def products(first: Floats, second: Floats) -> Floats:
+    """(k, i, l) products of matrices (k, i, j) and (k, j, l): faster than ``@`` where they are stored by component."""
+    return np.asarray(np.einsum("kij,kjl->kil", first, second))
+
+
+def cofactors(matrices: Floats) -> Floats:
+    """(..., 3, 3) cofactor matrices: the gradient of the determinant, det(A) A^-T where A is regular."""
+    result = np.empty_like(matrices)
+    for row in range(3):
+        one, other = (row + 1) % 3, (row + 2) % 3
+        for column in range(3):
+            left, right = (column + 1) % 3, (column + 2) % 3
+            result[..., row, column] = (
+                matrices[..., one, left] * matrices[..., other, right]
+                - matrices[..., one, right] * matrices[..., other, left]
+            )
+    return result
+
+
+def determinants(matrices: Floats) -> Floats:
+    """(...,) determinants of 3x3 matrices by expansion, many times faster than the batched LU."""
+    (a, b, c), (d, e, f), (g, h, i) = ([matrices[..., row, column] for column in range(3)] for row in range(3))
+    return np.asarray(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
+
+
+def closest_rotations(matrices: Floats) -> Floats:
+    """(k, 3, 3) rotations closest to each matrix in the Frobenius norm.
+
+    Scaled Newton iteration of the polar decomposition (Higham 1986) for matrices that keep orientation and are far
+    from singular; the singular value decomposition, with the sign of the determinant put into the last singular
+    value, for the rest.
+    """
+    norms = np.sqrt(np.einsum("kij,kij->k", matrices, matrices))
+    scaled = matrices / np.where(norms > 0.0, norms, 1.0)[:, None, None]
+    regular = determinants(scaled) > 1e-4
+    result = np.empty_like(matrices)
+    result[~regular] = _closest_rotations_svd(scaled[~regular])
+    current = scaled[regular]
+    for _ in range(_NEWTON_STEPS):
+        inverse = cofactors(current) / determinants(current)[:, None, None]
+        scale = np.sqrt(
+            np.sqrt(np.einsum("kij,kij->k", inverse, inverse) / np.einsum("kij,kij->k", current, current))
+        )[:, None, None]
+        following = 0.5 * (scale * current + inverse / scale)
+        change = float(np.abs(following - current).max(initial=0.0))
+        current = following
+        if change < 1e-14:
+            break
+    result[regular] = current
+    return result
+
+
+def _closest_rotations_svd(matrices: Floats) -> Floats:
+    left, _, right = np.linalg.svd(matrices)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    closest: Floats = left @ right
+    return closest
+
+
+def rotation_vectors(rotations: Floats) -> Floats:
+    """(k, 3) rotation vectors (axis times angle, angle in [0, pi]) of rotation matrices."""
+    quaternions = _quaternions(rotations)
+    vector, scalar = quaternions[:, 1:], quaternions[:, 0]
+    sine = np.linalg.norm(vector, axis=1)
+    angle = 2.0 * np.arctan2(sine, scalar)
+    return np.asarray(vector * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0)[:, None])
+
+
+def _quaternions(rotations: Floats) -> Floats:
+    """(k, 4) unit quaternions, scalar first and not negative; stable for every angle (Shepperd 1978)."""
+    diagonal = np.einsum("kii->ki", rotations)
+    trace = diagonal.sum(axis=1)
+    skew = np.stack(
+        [
+            rotations[:, 2, 1] - rotations[:, 1, 2],
+            rotations[:, 0, 2] - rotations[:, 2, 0],
+            rotations[:, 1, 0] - rotations[:, 0, 1],
+        ],
+        axis=1,
+    )
+    symmetric = rotations + rotations.transpose(0, 2, 1)
+    count = len(rotations)
+    # Row b of the table is 4 q_b q: every row is a valid answer, the longest one is the best conditioned.
+    table = np.empty((count, 4, 4))
+    table[:, 0, 0] = 1.0 + trace
+    table[:, 0, 1:] = table[:, 1:, 0] = skew
+    table[:, 1:, 1:] = symmetric
+    axes = np.arange(3)
+    table[:, 1 + axes, 1 + axes] = 1.0 + 2.0 * diagonal - trace[:, None]
+    best = np.argmax(np.einsum("kii->ki", table), axis=1)
+    quaternions = table[np.arange(count), best]
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return np.asarray(quaternions * np.where(quaternions[:, :1] < 0.0, -1.0, 1.0))
+
+
+def rotation_matrices(vectors: Floats) -> Floats:
+    """(k, 3, 3) rotation matrices exp([q]x) of rotation vectors of any length (Rodrigues' formula).
+
+    They are stored by component.
+    """
+    x, y, z = np.ascontiguousarray(vectors.T)
+    square = x * x + y * y + z * z
+    angle = np.sqrt(square)
+    small = angle < _SMALL_ANGLE
+    safe = np.where(small, 1.0, angle)
+    sine = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
+    # From half the angle: 1 - cos loses small angles to rounding.
+    cosine = np.where(small, 0.5 - square / 24.0, 2.0 * (np.sin(0.5 * safe) / safe) ** 2)
+    matrices = np.empty((3, 3, len(vectors)))
+    for axis, along in enumerate((x, y, z)):
+        matrices[axis, axis] = 1.0 - cosine * (square - along * along)
+    for row, column, product, third in ((0, 1, x * y, -z), (0, 2, x * z, y), (1, 2, y * z, -x)):
+        matrices[row, column] = cosine * product + sine * third
+        matrices[column, row] = cosine * product - sine * third
+    return np.asarray(np.moveaxis(matrices, -1, 0))
+
+
+def nearest_branch(vectors: Floats, references: Floats) -> Floats:
+    """(k, 3) rotation vectors of the same rotations, turned by the multiple of 2 pi that is nearest to a reference.
+
+    A rotation by the angle a about the unit axis u is also the one by a + 2 pi m, for every integer m. Where the
+    rotation is the identity, the axis is free and the reference's is taken.
+    """
+    angle = np.linalg.norm(vectors, axis=1)
+    reference_angle = np.linalg.norm(references, axis=1)
+    axis = np.where(
+        (angle > _NO_ANGLE)[:, None],
+        vectors / np.maximum(angle, 1e-300)[:, None],
+        references / np.maximum(reference_angle, 1e-300)[:, None],
+    )
+    along = np.einsum("ki,ki->k", axis, references)
+    turns = np.round((along - angle) / (2.0 * np.pi))
+    return np.asarray(vectors + axis * (2.0 * np.pi * turns)[:, None])

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface on its way from one key to the other: lengths, volumes and still vertices kept, both keys exact."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..keys.embedding import Embedding
+from ..numerics.grouped_sums import sums_by_label
+from ..numerics.rotation_unwrapping import Turning, consistent_turning
+from ..numerics.rotations import by_component
+from ..numerics.symmetric_matrices import Stretch
+from ..settings import StretchLaw
+from ..triangles.closed_volume import ClosedComponents
+from ..triangles.deformation import TriangleDeformation
+from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components
+from .anchors import ScrewAnchors
+from .end_rates import (
+    EndCorrection,
+    Rates,
+    end_spins,
+    hermite,
+    rotation_vector_rates,
+    slope_of_strain,
+    strain_of_slope,
+    stretch_slopes,
+)
+from .sweeps import Sweeps, Wanted
+from .system import MovingSurface
+from .tangents import tangents_of
+
+ANCHOR_WEIGHT = 0.05
+SWEEPS = 13
+# More shapes together save little and wait for each other; more triangles go through memory too often.
+_MOST_AT_ONCE = 4
+_TRIANGLES_AT_ONCE = 150_000
+_LEAST_VOLUME = 1e-12
+
+
+class SurfacePath:
+    """Shapes between the two keys of an embedded pair; everything that does not depend on the time is factored once.
+
+    Positions minimise ``sum w |grad x - R_t P_t|^2 + a sum m |x - anchor_t|^2`` over triangles with weight w, rotation
+    R_t and stretch P_t, and vertices with area m; rotations are refitted to positions in sweeps. Edges that belong to
+    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys.
+    The enclosed volume of every closed component is that between its key volumes.
+
+    Parameters
+    ----------
+    embedding : Embedding
+    law : StretchLaw
+        How stretches are interpolated.
+    free_after_turns : bool
+        Whether what comes back to its place after whole turns is not still, but turns with the rest of its component.
+
+    Attributes
+    ----------
+    vertices : (k,) int64
+        One of each group of vertices that coincide in both keys; ``deformation`` counts in these.
+    still : (n,) bool
+        Vertices that stay on the straight line between the keys.
+    components : (n,) int64
+        Labels of the connected components.
+    turning : Turning
+        How the triangles of ``deformation`` turn.
+    """
+
+    def __init__(self, embedding: Embedding, law: StretchLaw = "linear", free_after_turns: bool = False) -> None:
+        self._law: StretchLaw = law
+        self.vertices, self._group = embedding.pair.welding
+        self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
+        self._travel = key1 - self._key0
+        still = embedding.still[self.vertices]
+        count = len(self.vertices)
+        faces = self._group[embedding.pair.faces]
+        self.deformation = TriangleDeformation.between(self._key0, key1, faces)
+        usable = self.deformation
+        held = still[usable.faces].any(axis=1)
+        centres = self._key0[usable.faces].mean(axis=1)
+        self.turning = consistent_turning(usable.turns, face_adjacency(usable.faces), centres, usable.weights, held)
+        if free_after_turns:
+            still[usable.faces[self.turning.angles > np.pi]] = False
+        self.still = still[self._group]
+        self._free = ~still
+        self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
+        self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
+        labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
+        self.components = labels[self._group]
+        self._closed = ClosedComponents(faces, labels)
+        self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
+        weights = sums_by_label(self._group, embedding.weights, count)
+        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
+        size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
+        area = float(self.deformation.weights.sum()) or size**2
+        self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        self._correction: EndCorrection | None = None
+        self._surface = MovingSurface(
+            usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights
+        )
+        rows = self._surface.rows
+        self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
+        values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
+        self._moving_stretch = Stretch(by_component(values), by_component(vectors))
+        self._moving_tangents = by_component(usable.bases[rows, :, :2])
+
+    def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
+        """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
+        stronger = copy.copy(self)
+        strongest = np.ones(len(self._key0))
+        np.maximum.at(strongest, self._group, factors)
+        stronger._surface = self._surface.with_anchor_weights(self._anchor_weights * strongest)
+        return stronger
+
+    def end_rates(self) -> tuple[Rates, Rates]:
+        """How fast triangles turn and stretch, and volumes grow, at the first and at the second key."""
+        deformation = self.deformation
+        spins = end_spins(self.turning.swing, self.turning.twist)
+        slopes = stretch_slopes(deformation.stretch, self._law)
+        growth = self._volumes[1] - self._volumes[0]
+        # Seen in the tangents of the second key.
+        second = deformation.spins @ strain_of_slope(deformation.stretch, slopes[1])
+        second = second @ deformation.spins.transpose(0, 2, 1)
+        return Rates(spins[0], slopes[0], growth), Rates(spins[1], second, growth)
+
+    def with_end_rates(self, first: Rates, second: Rates) -> SurfacePath:
+        """The same path between the same keys with other rates at its ends."""
+        deformation = self.deformation
+        before, after = (own.toward(new) for own, new in zip(self.end_rates(), (first, second), strict=True))
+        strain = deformation.spins.transpose(0, 2, 1) @ after.strain @ deformation.spins
+        corrected = copy.copy(self)
+        corrected._correction = EndCorrection(
+            (before.spin, rotation_vector_rates(self.turning.swing, after.spin)),
+            (before.strain, slope_of_strain(deformation.stretch, strain)),
+            (before.growth, after.growth),
+        )
+        return corrected
+
+    @property
+    def shapes_at_once(self) -> int:
+        """For how many times it pays to solve together: a few where that spares calls and passes of the factors."""
+        return max(1, min(_MOST_AT_ONCE, _TRIANGLES_AT_ONCE // max(1, len(self._surface.rows))))
+
+    @property
+    def inside_out(self) -> int:
+        """How many closed components are mirrored or turned inside out between the keys: no motion of a volume does."""
+        first, second = (np.where(np.abs(volume) > _LEAST_VOLUME, volume, 0.0) for volume in self._volumes)
+        return int(np.count_nonzero(first * second < 0.0))
+
+    def positions(self, time: float, anchor: Floats | None = None, sweeps: int = SWEEPS) -> Floats:
+        """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.
+
+        Parameters
+        ----------
+        time : float
+        anchor : (n, 3), optional
+            What vertices are drawn to, the key at 0 and 1; without it each component is drawn along its screw.
+        sweeps : int
+            How often rotations are fitted to positions and positions to rotations.
+        """
+        return self.shapes([(time, anchor)], sweeps)[0]
+
+    def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
+        """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
+        settled = Sweeps(self._surface, [self._wanted(*moment) for moment in moments]).settled(sweeps)
+        return [shape[self._group] for shape in settled]
+
+    def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
+        anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
+        stretch = self._moving_stretch.at(time, self._law)
+        lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
+        volumes = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
+        turn_change: Floats | float = 0.0
+        if self._correction is not None:
+            rows = self._surface.rows
+            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
+            turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
+            volumes = volumes + hermite(time, *self._correction.volumes)
+        tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
+        start = self._key0 + time * self._travel
+        start[self._free] = anchors[self._free]
+        return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
+
+
+def _spans(positions: Floats, edges: Ints) -> Floats:
+    return np.asarray(positions[edges[:, 1]] - positions[edges[:, 0]])
+
+
+def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
+    """(k, 2) edges that no usable triangle holds together: wires and edges of triangles without an area."""
+    every = unique_edges(np.concatenate([sides(faces), wires]))
+    held = unique_edges(sides(usable))
+    span = int(every.max(initial=0)) + 1
+    covered = among(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
+    return np.asarray(every[~covered])

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The system of a surface's moving vertices.
+
+The part that moves is small on most shape keys, so vertices that rest, and triangles among them, are left out.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from ..arrays import Bools, Floats, Ints
+from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_elements
+from ..numerics.nested_dissection import dissection_order, factored
+from ..numerics.rotations import by_component
+from ..triangles.closed_volume import ClosedComponents
+from ..triangles.deformation import TriangleDeformation
+from ..triangles.topology import distinct
+from .volumes import MovingVolumes
+
+
+class MovingSurface:
+    """The system that a surface's moving vertices solve; it is factored once for all times.
+
+    Parameters
+    ----------
+    deformation : TriangleDeformation
+    springs : (s, 2) int64
+        Edges that keep their length.
+    closed : ClosedComponents
+    free : (n,) bool
+        Vertices that move.
+    points : (n, 3)
+        Where the vertices are, for the order of elimination.
+    anchor_weights : (n,)
+
+    Attributes
+    ----------
+    rows : (m,) int64
+        The triangles of the deformation that have a moving corner.
+    springs : (s,) int64
+        The springs that have a moving end.
+    moving, used : (k,), (l,) int64
+        The vertices that move, and these with those that rest beside them.
+    """
+
+    def __init__(
+        self,
+        deformation: TriangleDeformation,
+        springs: Ints,
+        closed: ClosedComponents,
+        free: Bools,
+        points: Floats,
+        anchor_weights: Floats,
+    ) -> None:
+        count = len(free)
+        self.rows: Ints = np.flatnonzero(free[deformation.faces].any(axis=1))
+        self.springs: Ints = np.flatnonzero(free[springs].any(axis=1))
+        faces, edges = deformation.faces[self.rows], springs[self.springs]
+        self.weights = deformation.weights[self.rows]
+        self.hats = by_component(deformation.gradients[self.rows])
+        spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(edges), 2, 2))
+        stiffness = csr_array(
+            StiffnessPattern(faces, count).assemble(stiffness_elements(self.weights, self.hats))
+            + StiffnessPattern(edges, count).assemble(spring)
+        )
+        moving = np.flatnonzero(free)
+        moving = moving[dissection_order(points[moving], csr_array(stiffness[moving][:, moving]))]
+        touched = closed.faces[free[closed.faces].any(axis=1)]
+        beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
+        beside = beside[~free[beside]]
+        self.moving, self.used = moving, np.concatenate([moving, beside])
+        number = np.zeros(count, dtype=np.int64)
+        number[self.used] = np.arange(len(self.used))
+        self.faces = number[faces]
+        self._stiffness = csr_array(stiffness[moving][:, moving])
+        self.stiffness_beside = csr_array(stiffness[moving][:, beside])
+        self.volumes = MovingVolumes(closed, moving, self.used)
+        self.gradient = gradient_operator(self.faces, self.hats, len(self.used))
+        ends = np.tile([-1.0, 1.0], len(edges)), number[edges].ravel(), np.arange(0, 2 * len(edges) + 1, 2)
+        self.spans = csr_array(ends, shape=(len(edges), len(self.used)))
+        self._factor(anchor_weights)
+
+    def with_anchor_weights(self, anchor_weights: Floats) -> MovingSurface:
+        """The same system with other anchor weights (n,)."""
+        other = copy.copy(self)
+        other._factor(anchor_weights)
+        return other
+
+    def _factor(self, anchor_weights: Floats) -> None:
+        self.anchor_weights = anchor_weights[self.moving]
+        self._factored = factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
+
+    def solve(self, loads: Floats) -> Floats:
+        """(..., k) solutions for loads (..., k) on the moving vertices: the factors pass through memory once."""
+        flat = loads.reshape(-1, loads.shape[-1])
+        return np.asarray(self._factored.solve(flat.T).T.reshape(loads.shape))

@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find points in a tetrahedral mesh: which tetrahedron holds each of them, and with what barycentric weights."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import MeshingError
+from .mesh import TetMesh
+
+ROUNDING = 1e-12  # a weight this far below zero is still "inside": the point lies on a face
+TOLERANCE = 1e-9  # the most negative weight ever returned
+_CANDIDATES = 64
+
+
+def locate(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats]:
+    """Locate points by a walk from the nearest centroid across the face behind which each point lies.
+
+    The walk is the visibility walk of Devillers, Pion & Teillaud (2002), for all points at once. On meshes that are not
+    Delaunay it may go round in circles; such points are looked for among the nearest tetrahedra, then in all of them.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        A mesh whose union is convex (the cube).
+    points : (n, 3) float64
+        Where to look, in the mesh's units.
+
+    Returns
+    -------
+    tets : (n,) int64
+        The tetrahedron that holds each point.
+    weights : (n, 4) float64
+        Barycentric weights; they sum to 1 and none is below -1e-9.
+
+    Raises
+    ------
+    MeshingError
+        If a point is not finite or lies outside the mesh.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    lowest, highest = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    # Not "outside the box": the comparison must also catch what is not a number.
+    _require_inside(points, ((points >= lowest - TOLERANCE) & (points <= highest + TOLERANCE)).all(axis=1))
+    tree = cKDTree(mesh.centroids)
+    tets = np.asarray(tree.query(points)[1], dtype=np.int64)
+    lost = _walk(mesh, points, tets)
+    lost = lost[~_choose_among_nearest(mesh, points, tets, lost, tree)]
+    for point in lost:
+        tets[point] = _search_everywhere(mesh, points[point])
+    weights = barycentric(mesh, tets, points)
+    _require_inside(points, weights.min(axis=1) >= -TOLERANCE)
+    return tets, weights
+
+
+def interpolation_matrix(mesh: TetMesh, points: Floats) -> csr_array:
+    """The sparse matrix B (n, N) that interpolates from the mesh's vertices to ``points``: B @ mesh.points = points.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    points : (n, 3) float64
+
+    Raises
+    ------
+    MeshingError
+        If a point is not finite or lies outside the mesh.
+    """
+    tets, weights = locate(mesh, points)
+    starts = np.arange(0, 4 * len(tets) + 1, 4)
+    return csr_array((weights.ravel(), mesh.tets[tets].ravel(), starts), shape=(len(tets), len(mesh.points)))
+
+
+def barycentric(mesh: TetMesh, tets: Ints, points: Floats) -> Floats:
+    """(..., 4) weights of ``points`` (..., 3) with respect to the tetrahedra ``tets`` (...); negative outside.
+
+    They sum to 1, and are measured from the first corner, so that weights @ corners gives the point back to rounding.
+    """
+    offsets = points - mesh.points[mesh.tets[tets, 0]]
+    others = np.einsum("...ka,...a->...k", mesh.gradients[tets, 1:], offsets)
+    return np.concatenate([1.0 - others.sum(axis=-1, keepdims=True), others], axis=-1)
+
+
+def _require_inside(points: Floats, inside: Bools) -> None:
+    outside = np.flatnonzero(~inside)
+    if outside.size:
+        raise MeshingError(
+            f"Point {outside[0]} at {points[outside[0]]} lies outside the tetrahedral mesh "
+            f"({outside.size} such points in all)."
+        )
+
+
+def _walk(mesh: TetMesh, points: Floats, tets: Ints) -> Ints:
+    """Move ``tets`` (n,), in place, to where the points are; return the points that have not arrived."""
+    active = np.arange(len(points))
+    for _ in range(20 + 4 * round(len(mesh.tets) ** (1 / 3))):
+        if not active.size:
+            break
+        weights = barycentric(mesh, tets[active], points[active])
+        # On the boundary there is nothing behind a face: go round by another face that the point is behind.
+        weights[(mesh.neighbours[tets[active]] < 0) & (weights < -ROUNDING)] = 0.0
+        corner = weights.argmin(axis=1)
+        behind = weights.min(axis=1) < -ROUNDING
+        active, corner = active[behind], corner[behind]
+        tets[active] = mesh.neighbours[tets[active], corner]
+    inside = barycentric(mesh, tets, points).min(axis=1) >= -ROUNDING
+    return np.flatnonzero(~inside)
+
+
+def _choose_among_nearest(mesh: TetMesh, points: Floats, tets: Ints, lost: Ints, tree: cKDTree) -> Bools:
+    """For the lost points take the best of the nearest tetrahedra; return which of them that settles."""
+    if not lost.size:
+        return np.empty(0, dtype=bool)
+    nearest = np.asarray(tree.query(points[lost], k=min(_CANDIDATES, len(mesh.tets)))[1]).reshape(len(lost), -1)
+    candidates = np.concatenate([tets[lost, None], nearest], axis=1)
+    smallest = barycentric(mesh, candidates, points[lost, None]).min(axis=-1)
+    best = smallest.argmax(axis=1)
+    rows = np.arange(len(lost))
+    tets[lost] = candidates[rows, best]
+    return np.asarray(smallest[rows, best] >= -TOLERANCE)
+
+
+def _search_everywhere(mesh: TetMesh, point: Floats) -> int:
+    """The tetrahedron of the whole mesh with the largest smallest weight."""
+    smallest = barycentric(mesh, np.arange(len(mesh.tets)), np.broadcast_to(point, (len(mesh.tets), 3))).min(axis=1)
+    return int(smallest.argmax())

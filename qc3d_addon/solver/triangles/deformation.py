@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangles that go from one key to the other by their own rotation and stretch.
+
+Every triangle has a deformation gradient from the first key to the second, the unit normals being the third
+direction (Sumner & Popovic 2004). Its rotation and in-plane stretch are interpolated, and positions are fitted to
+them in the least-squares sense (Xu et al. 2005), then rotations to positions and so on (Sorkine & Alexa 2007).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..numerics.rotations import rotation_vectors
+from ..numerics.symmetric_matrices import Stretch
+from .geometry import face_normals, hat_gradients, planar_jacobians, tangent_bases
+
+# Triangles thinner than this part of the largest area have no usable directions in floating point; nor have those
+# whose area may come from rounding: this part of their longest edge times the largest coordinate.
+_THINNEST = 1e-10
+_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleDeformation:
+    """Rotation and stretch of triangles between two keys, in local tangent bases.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+        Triangles that have an area in both keys.
+    weights : (m,)
+        What each counts in a fit: between one each and its area, so that small triangles keep their lengths too.
+        The sum is the area of the surface in the first key.
+    bases : (m, 3, 3)
+        Columns: two tangents and the unit normal in the first key.
+    gradients : (m, 3, 2)
+        Gradients of the hat functions in the tangent basis of the first key.
+    stretch : Stretch
+        Symmetric in-plane stretch (m, 2, 2) from the first key to the second.
+    turns : (m, 3)
+        Rotation vectors in radians, the short way round.
+    spins : (m, 2, 2)
+        Rotations in the plane: from the tangents of the first key, carried along, to those of the second.
+    rows : (m,) int64
+        Which triangles of the mesh these are.
+    """
+
+    faces: Ints
+    weights: Floats
+    bases: Floats
+    gradients: Floats
+    stretch: Stretch
+    turns: Floats
+    spins: Floats
+    rows: Ints
+
+    @classmethod
+    def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
+        """Deformation from ``key0`` (n, 3) to ``key1`` of the triangles of ``faces`` that have an area in both."""
+        double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
+        usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
+        faces = faces[usable]
+        bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
+        gradients = hat_gradients(key0, faces, bases0)
+        planar = planar_jacobians(key1, faces, bases1, gradients)
+        spin = _planar_rotations(planar)
+        stretch = spin.transpose(0, 2, 1) @ planar
+        stretch = 0.5 * (stretch + stretch.transpose(0, 2, 1))
+        rotations = _lifted(bases1, spin) @ bases0.transpose(0, 2, 1)
+        areas = 0.5 * double0[usable]
+        weights = np.sqrt(areas)
+        weights *= areas.sum() / max(float(weights.sum()), 1e-300)
+        turns = rotation_vectors(rotations)
+        return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
+
+
+def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
+    """(m,) what twice the area of a triangle must exceed: beside the largest, and beside rounding of its corners."""
+    corners = key[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
+    return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
+
+
+def _planar_rotations(planar: Floats) -> Floats:
+    """(m, 2, 2) rotations closest to 2 x 2 matrices."""
+    cosine, sine = planar[:, 0, 0] + planar[:, 1, 1], planar[:, 1, 0] - planar[:, 0, 1]
+    angle = np.arctan2(sine, cosine)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
+
+
+def _lifted(bases: Floats, spin: Floats) -> Floats:
+    """(m, 3, 3) bases with the tangents turned in their plane."""
+    lifted = bases.copy()
+    lifted[:, :, :2] = bases[:, :, :2] @ spin
+    return lifted

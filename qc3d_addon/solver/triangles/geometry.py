@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Elementary geometry of triangles: normals, areas, tangent bases, gradients of hat functions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..numerics.grouped_sums import sums_by_label
+
+
+def cross_product(first: Floats, second: Floats) -> Floats:
+    """(3, ...) cross products of vectors (3, ...), stored by coordinate."""
+    (x, y, z), (u, v, w) = first, second
+    product = np.empty((3, *x.shape))
+    np.subtract(y * w, z * v, out=product[0])
+    np.subtract(z * u, x * w, out=product[1])
+    np.subtract(x * v, y * u, out=product[2])
+    return product
+
+
+def face_normals(positions: Floats, faces: Ints) -> Floats:
+    """(m, 3) normals of the triangles, twice as long as the areas."""
+    first, second, third = (positions[faces[:, corner]] for corner in range(3))
+    return np.asarray(np.cross(second - first, third - first))
+
+
+def tangent_bases(positions: Floats, faces: Ints) -> Floats:
+    """(m, 3, 3) orthonormal columns: along the first edge, across it in the plane, and the unit normal."""
+    normal = face_normals(positions, faces)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    along = positions[faces[:, 1]] - positions[faces[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    return np.stack([along, np.cross(normal, along), normal], axis=2)
+
+
+def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
+    """(m, 3, 2) gradients of the three hat functions of each triangle in its tangent basis."""
+    edges = np.stack(
+        [positions[faces[:, 1]] - positions[faces[:, 0]], positions[faces[:, 2]] - positions[faces[:, 0]]], axis=2
+    )
+    inner = np.linalg.inv(bases[:, :, :2].transpose(0, 2, 1) @ edges)
+    return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+
+def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: Floats) -> Floats:
+    """(m, 2, 2) in-plane Jacobians from the tangent basis of ``gradients`` to that of ``bases``."""
+    corners = np.einsum("mki,mij->mkj", positions[faces], bases[:, :, :2])
+    return np.asarray(np.einsum("mki,mkj->mij", corners, gradients))
+
+
+def areas(positions: Floats, faces: Ints) -> Floats:
+    """(m,) areas of the triangles (m, 3) of positions (n, 3), in the square of their unit."""
+    return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
+
+
+def vertex_areas(points: Floats, faces: Ints) -> Floats:
+    """(n,) a third of the area of the triangles around each vertex, never below a thousandth of the mean."""
+    shares = sums_by_label(faces.ravel(), np.repeat(areas(points, faces) / 3.0, 3), len(points))
+    mean = float(shares.mean())
+    return np.maximum(shares, 1e-3 * mean) if mean > 0.0 else np.ones(len(points))

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mirror image of every vertex."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Floats, Ints
+from ..errors import InputError
+
+TOLERANCE = 1e-4  # of the bounding box's diagonal
+
+_MOST_TOGETHER = 8  # vertices in one place
+
+
+def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float = TOLERANCE) -> Ints:
+    """The vertex that lies where each vertex's mirror image is.
+
+    Parameters
+    ----------
+    points : (n, 3)
+        A shape that is symmetric about the plane where the coordinate ``axis`` is 0.
+    edges : (e, 2)
+        Edges; they tell apart vertices that lie in one place, such as those of closed lips.
+    axis : int
+        0, 1 or 2.
+    tolerance : float
+        How far a partner may be from the mirror image, relative to the bounding box's diagonal.
+
+    Returns
+    -------
+    (n,) partners; the partner of a vertex's partner is that vertex itself.
+
+    Raises
+    ------
+    InputError
+        If vertices have no partner, naming how many.
+    """
+    count = len(points)
+    reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+    images = points.copy()
+    images[:, axis] *= -1.0
+    distances, near = cKDTree(points).query(images, k=min(_MOST_TOGETHER, count), distance_upper_bound=reach)
+    candidates = np.isfinite(np.reshape(distances, (count, -1)))
+    near = np.reshape(near, (count, -1))
+    missing = ~candidates.any(axis=1)
+    if missing.any():
+        raise _no_symmetry(int(missing.sum()), count, axis)
+    single = candidates.sum(axis=1) == 1
+    partners = np.where(single, near[:, 0], -1)
+    if not single.all():
+        together = np.flatnonzero(~single)
+        _settle(partners, {int(vertex): near[vertex, candidates[vertex]].tolist() for vertex in together}, edges)
+    lost = int((partners < 0).sum())
+    if not lost:
+        lost = int((partners[partners] != np.arange(count)).sum())
+    if lost:
+        raise _no_symmetry(lost, count, axis)
+    return partners
+
+
+def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> None:
+    """Choose among several candidates by the neighbours, whose partners are neighbours of the right one.
+
+    Only the few vertices that lie in one place with others come here.
+    """
+    involved = np.unique([*candidates, *chain.from_iterable(candidates.values())])
+    touching = edges[np.isin(edges, involved).any(axis=1)]
+    linked = {frozenset(edge) for edge in touching.tolist()}
+    neighbours: dict[int, list[int]] = {}
+    for first, second in touching.tolist():
+        neighbours.setdefault(first, []).append(second)
+        neighbours.setdefault(second, []).append(first)
+    open_vertices = list(candidates)
+    while open_vertices:
+        left = []
+        for vertex in open_vertices:
+            known = [int(partners[other]) for other in neighbours.get(vertex, ()) if partners[other] >= 0]
+            fits = [c for c in candidates[vertex] if known and all(frozenset((c, other)) in linked for other in known)]
+            if len(fits) == 1:
+                partners[vertex] = fits[0]
+            else:
+                left.append(vertex)
+        if len(left) == len(open_vertices):
+            return
+        open_vertices = left
+
+
+def _no_symmetry(lost: int, count: int, axis: int) -> InputError:
+    return InputError(
+        f"{lost} of {count} vertices have no mirror image across {'xyz'[axis]} = 0; the Basis must be symmetric to "
+        "mirror in-betweens."
+    )

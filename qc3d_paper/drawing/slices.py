@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tetrahedra cut by a plane, and pictures of what varies over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+from qc3d_addon.solver.arrays import Floats, Ints
+from qc3d_addon.solver.maps.analysis import Analysis
+
+from .surfaces import add_colour_bar, scale
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+
+_AXES = "xyz"
+_HISTOGRAM_BINS = 80
+# Edges that a plane crosses, after sorting: from the one corner on its side to the others; from each of two to two.
+_ONE = np.array([[0, 1], [0, 2], [0, 3], [0, 3]])
+_TWO = np.array([[0, 2], [0, 3], [1, 3], [1, 2]])
+
+
+def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floats]:
+    """Cut tetrahedra by the plane where one coordinate has a value.
+
+    Parameters
+    ----------
+    points : (N, 3), tets : (M, 4)
+        The mesh.
+    axis : int
+        0, 1 or 2.
+    place : float
+        The coordinate of the plane.
+
+    Returns
+    -------
+    (k,) the tetrahedra that are cut, and (k, 4, 2) the corners of the cuts in the other two coordinates, in order
+    around them; triangles have their last corner twice.
+    """
+    above = points[tets, axis] > place
+    count = above.sum(axis=1)
+    rest = [other for other in range(3) if other != axis]
+    cuts, polygons = [], []
+    for number, side, ends in ((1, above, _ONE), (3, ~above, _ONE), (2, above, _TWO)):
+        rows = np.flatnonzero(count == number)
+        # Corners sorted so that the one by itself comes first, or, two and two, those above.
+        order = np.argsort(~side[rows], axis=1, kind="stable")
+        corners = points[np.take_along_axis(tets[rows], order, axis=1)]
+        first, second = corners[:, ends[:, 0]], corners[:, ends[:, 1]]
+        part = (place - first[..., axis]) / (second[..., axis] - first[..., axis])
+        polygons.append((first + part[..., None] * (second - first))[..., rest])
+        cuts.append(rows)
+    return np.concatenate(cuts), np.concatenate(polygons)
+
+
+def draw_slice(axes: Axes, analysis: Analysis, axis: int, place: float, measure: str) -> None:
+    """Draw where a plane cuts the source, coloured by a measure of the analysis."""
+    mesh = analysis.mapping.mesh
+    rows, polygons = cut(mesh.points, mesh.tets, axis, place)
+    values = analysis.measures[measure]
+    colours = scale(measure, values).mappable
+    drawn = PolyCollection(list(polygons), array=values[rows], norm=colours.norm, cmap=colours.cmap)
+    drawn.set_edgecolor("face")
+    drawn.set_linewidth(0.2)
+    axes.add_collection(drawn)
+    axes.set_aspect("equal")
+    axes.autoscale()
+    across, up = (name for number, name in enumerate(_AXES) if number != axis)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    axes.set_title(f"{_AXES[axis]} = {place:.3g}")
+
+
+def save_slices(analysis: Analysis, path: Path) -> None:
+    """Three slices through the middle of the source, for the dilatation and for the volume ratio."""
+    middle = 0.5 * (analysis.mapping.mesh.points.min(axis=0) + analysis.mapping.mesh.points.max(axis=0))
+    figure, panels = pyplot.subplots(2, 3, figsize=(13, 8), layout="constrained")
+    for row, (measure, title) in enumerate((("dilatation", "dilatation K"), ("volume_ratio", "volume ratio"))):
+        for axis in range(3):
+            draw_slice(panels[row, axis], analysis, axis, float(middle[axis]), measure)
+        add_colour_bar(figure, scale(measure, analysis.measures[measure]), panels[row], label=title, shrink=0.9)
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
+def save_histograms(analysis: Analysis, path: Path) -> None:
+    """How much of the source's volume has which eigenvalues, volume ratio and dilatations."""
+    mesh = analysis.mapping.mesh
+    share = 100.0 * mesh.volumes / mesh.volumes.sum()
+    shown = {
+        "eigenvalues a, b, c": dict(zip("abc", analysis.eigenvalues.T, strict=True)),
+        "volume ratio abc": {"": analysis.measures["volume_ratio"]},
+        "dilatations": {
+            "K = a / c": analysis.measures["dilatation"],
+            "outer, a² / bc": analysis.measures["outer_dilatation"],
+            "inner, ab / c²": analysis.measures["inner_dilatation"],
+        },
+    }
+    figure, panels = pyplot.subplots(1, 3, figsize=(13, 3.8), layout="constrained")
+    for axes, (title, curves) in zip(panels, shown.items(), strict=True):
+        known = {label: (values > 0.0) & np.isfinite(values) for label, values in curves.items()}
+        every = np.concatenate([values[known[label]] for label, values in curves.items()])
+        low, high = (every.min(), every.max()) if len(every) else (1.0, 1.0)
+        bins = np.geomspace(low / 1.01, high * 1.01, _HISTOGRAM_BINS)
+        for label, values in curves.items():
+            axes.hist(values[known[label]], bins, weights=share[known[label]], histtype="step", label=label)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(1e-4, 200.0)
+        axes.set_xlabel(title)
+        axes.axvline(1.0, color="0.7", linewidth=0.8, zorder=0)
+        if len(curves) > 1:
+            axes.legend()
+    panels[0].set_ylabel("% of the volume")
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes painted with their distortion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib
+import numpy as np
+
+from qc3d_addon.solver.keys.keypair import KeyPair
+
+from .shading import Camera, Floats, best_view, draw
+from .sheets import BACKGROUND, KEY_COLOUR
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+_HEIGHT = 420  # pixels of a shape
+
+
+def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path) -> None:
+    """The first key, and the second once for each measure (n,), painted with it."""
+    camera = Camera.around(np.stack([pair.key0, pair.key1]), best_view(pair.key0, pair.key1))
+    columns = 1 + len(measures)
+    figure, panels = pyplot.subplots(1, columns, figsize=(4.2 * columns, 5.4), layout="constrained")
+    figure.set_facecolor(BACKGROUND)
+    panels[0].imshow(draw(pair.key0, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
+    panels[0].set_title("first key")
+    for axes, (name, values) in zip(panels[1:], measures.items(), strict=True):
+        colours = scale(name, values)
+        paint = np.asarray(colours.mappable.to_rgba(values[pair.faces].mean(axis=1)))[:, :3]
+        axes.imshow(draw(pair.key1, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
+        axes.set_title(f"second key: {name}")
+        add_colour_bar(figure, colours, axes, location="bottom", shrink=0.7)
+    for axes in panels:
+        axes.axis("off")
+    figure.savefig(path, dpi=100, facecolor=BACKGROUND)
+    pyplot.close(figure)
+
+
+class Scale(NamedTuple):
+    """Colours from one value to another, logarithmic."""
+
+    mappable: ScalarMappable
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, low: float, high: float, colours: str) -> Scale:
+        """A scale of one of matplotlib's colour maps."""
+        return cls(ScalarMappable(LogNorm(low, high, clip=True), colours), low, high)
+
+
+def scale(name: str, values: Floats) -> Scale:
+    """Colours for a measure of any place, logarithmic, the outermost percent cut off."""
+    usable = values[np.isfinite(values) & (values > 0.0)]
+    if "dilatation" in name:
+        end = max(float(np.percentile(usable, 99)), 1.01) if len(usable) else 1.01
+        return Scale.of(1.0, end, "viridis")
+    away = np.percentile(np.abs(np.log(usable)), 99) if len(usable) else 0.0
+    end = max(float(np.exp(away)), 1.01)
+    return Scale.of(1.0 / end, end, "coolwarm")
+
+
+def add_colour_bar(figure: Figure, colours: Scale, axes: Any, **options: Any) -> None:  # noqa: ANN401
+    """The scale beside or below ``axes``, with its ends and its middle written out."""
+    ticks = [colours.low, (colours.low * colours.high) ** 0.5, colours.high]
+    bar = figure.colorbar(colours.mappable, ax=axes, **options)
+    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+    bar.minorticks_off()

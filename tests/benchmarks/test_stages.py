@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stages' benchmark: its shapes, and one small measurement from end to end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks import stages
+from benchmarks.stage_cases import limb
+from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
+
+
+def test_the_limb_is_closed_and_faces_outwards_in_both_shapes() -> None:
+    faces, sphere, bent = limb(500)
+    components = ClosedComponents(faces, np.zeros(len(sphere), dtype=np.int64))
+    assert len(faces) == 2 * 500 - 4
+    volumes = [components.volumes(shape)[0] for shape in (sphere, bent)]
+    assert 0.9 * 4.0 / 3.0 * np.pi < volumes[0] < 4.0 / 3.0 * np.pi
+    # Drawn out to three times the length, 0.8 of the width, and bent about its middle, which keeps the volume.
+    assert 0.97 * 3.0 * 0.8**2 < volumes[1] / volumes[0] < 1.03 * 3.0 * 0.8**2
+
+
+def test_every_stage_is_timed() -> None:
+    found = stages.run("limb:300", "delaunay", 2, "one")
+    for stage in ("mesh", "locate", "path", "fit", "factor", "frames", "measure"):
+        assert found[f"stage_{stage}"] > 0.0
+    assert found["cold"] >= sum(found[f"stage_{stage}"] for stage in ("mesh", "fit", "frames"))
+    assert 0.0 < found["floor"] < found["one"]
+    assert 0.0 < found["floor_alone"] < found["one"]
+    assert found["folds"] == 0
+    assert found["peak_mb"] > 10.0

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``qc3d bake``: from a .blend file to one with in-betweens, and one sentence where the input is not usable."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import bpy
+import pytest
+
+from qc3d_addon.cli import main
+
+QUICK = ["--quality", "normal", "--engine", "delaunay"]
+
+
+def bake(file: Path, *more: str) -> int:
+    command = ["bake", str(file), "--object", "Bar", "--from", "Basis", "--to", "Bent", "--frames", "2"]
+    return main.main([*command, "--output", "out.blend", *QUICK, *more])
+
+
+def test_the_file_gets_its_inbetweens(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = bar_scene.read_bytes()
+    assert bake(bar_scene, "--report", "out.json", "--keyframes", "10", "30") == 0
+    assert bar_scene.read_bytes() == before
+    assert sorted(os.listdir()) == ["out.blend", "out.json"]
+
+    report = json.loads(Path("out.json").read_text())
+    assert report["folds"]["map"] == 0
+    assert len(report["folds"]["frames"]) == 4
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    obj = bpy.data.objects["Bar"]
+    assert obj.data.shape_keys.key_blocks.keys() == ["Basis", "Bent", *report["keys"]]
+    assert obj[report["slider"]] == 0.0
+    for frame, value in ((10, 0.0), (20, 0.5), (30, 1.0)):
+        bpy.context.scene.frame_set(frame)
+        assert obj[report["slider"]] == pytest.approx(value, abs=1e-6)
+
+
+def test_a_chain_goes_there_and_back(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert bake(bar_scene, "--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear") == 0
+    report = json.loads(Path("out.json").read_text())
+    assert report["via"] == ["Bent"]
+    assert report["keys"] == [f"Basis→Bent→Basis {step}/6" for step in range(1, 6)]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert set(report["keys"]) < set(bpy.data.objects["Bar"].data.shape_keys.key_blocks.keys())
+
+
+def test_a_file_may_be_baked_into_itself(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    copy = tmp_path / "out.blend"
+    copy.write_bytes(bar_scene.read_bytes())
+    assert bake(copy) == 0
+    assert os.listdir() == ["out.blend"]
+    bpy.ops.wm.open_mainfile(filepath=str(copy))
+    assert len(bpy.data.objects["Bar"].data.shape_keys.key_blocks) > 3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--object", "Foo"], "has no object 'Foo'; its meshes: 'Bar', 'Plain'"),
+        (["--object", "Plain"], "'Plain' has fewer than two shape keys"),
+        (["--to", "Up"], "no shape key 'Up'"),
+        (["--to", "Basis"], "two different keys"),
+        (["--via", "Up"], "no shape key 'Up'; choose inner key 1"),
+        (["--frames", "0"], "0 in-betweens are not possible"),
+        (["--frames", "5000"], "5000 in-betweens are not possible"),
+        (["--frames", "-1"], "-1 in-betweens are not possible"),
+        (["--keyframes", "9", "9"], "must come after the first"),
+        (["--output", "missing/out.blend"], "out.blend cannot be written: No such file or directory"),
+        (["--report", "out.blend"], "named twice"),
+    ],
+)
+def test_unusable_options(
+    options: list[str],
+    said: str,
+    bar_scene: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = bar_scene.read_bytes()
+    assert bake(bar_scene, *options) == 2
+    text = capsys.readouterr().err
+    assert said in text
+    assert text.startswith("qc3d: ")
+    assert text.count("\n") == 1
+    assert os.listdir() == []
+    assert bar_scene.read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["missing", "text", "folder"])
+def test_files_that_are_no_scene(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "odd.blend"
+    if kind == "text":
+        path.write_text("not a scene")
+    elif kind == "folder":
+        path.mkdir()
+    assert bake(path) == 2
+    text = capsys.readouterr().err
+    assert text.startswith("qc3d: ")
+    assert "odd.blend" in text
+    assert text.count("\n") == 1
+    assert not Path("out.blend").exists()

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the documentation names in the code is there."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from functools import reduce
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+# `solver/module.py`: `Name`, `Name.name`
+NAMED = re.compile(r"`solver/([\w/]+)\.py`: ((?:`[\w.]+`(?:, )?)+)")
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_modules_exist(page: Path) -> None:
+    for module in re.findall(r"`solver/([\w/]+)\.py`", page.read_text(encoding="utf-8")):
+        importlib.import_module(_dotted(module))
+
+
+def test_every_formula_is_computed_where_it_says() -> None:
+    found = NAMED.findall((DOCS / "method.md").read_text(encoding="utf-8"))
+    assert len(found) > 20
+    for module, names in found:
+        for name in re.findall(r"`([\w.]+)`", names):
+            reduce(getattr, name.split("."), importlib.import_module(_dotted(module)))
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_pictures_exist(page: Path) -> None:
+    for picture in re.findall(r"\]\((images/[^)]+)\)", page.read_text(encoding="utf-8")):
+        assert (DOCS / picture).is_file(), picture
+
+
+def _dotted(module: str) -> str:
+    return f"qc3d_addon.solver.{module.replace('/', '.')}"

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is refused on the way in, and in which words; and the choices a user has."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.keys.keypair import KeyPair
+
+from ..meshes import icosphere
+
+POINTS, FACES = icosphere(0)
+
+
+def with_value(array: np.ndarray, place: tuple[int, int], value: float) -> np.ndarray:
+    changed = array.copy()
+    changed[place] = value
+    return changed
+
+
+class TestKeyPair:
+    def test_arrays_are_copied_and_typed(self) -> None:
+        key0 = POINTS.astype(np.float32)
+        pair = KeyPair.checked(key0, POINTS.tolist(), FACES.astype(np.int32), [[0, 1]])
+        assert pair.key0.dtype == pair.key1.dtype == np.float64
+        assert pair.faces.dtype == pair.edges.dtype == np.int64
+        key0[:] = 0.0
+        np.testing.assert_array_equal(pair.key0, POINTS.astype(np.float32))
+
+    def test_diagonal(self) -> None:
+        key0 = np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 12]])
+        assert KeyPair.checked(key0, 2.0 * key0, np.empty((0, 3))).diagonal == 13.0
+
+    def test_without_edges_and_faces(self) -> None:
+        pair = KeyPair.checked(POINTS, POINTS, np.empty((0, 3)))
+        assert pair.faces.shape == (0, 3)
+        assert pair.edges.shape == (0, 2)
+
+    @pytest.mark.parametrize(
+        ("arguments", "sentence"),
+        [
+            ((POINTS[:, :2], POINTS, FACES), "The first key has shape (12, 2)"),
+            ((POINTS, POINTS.ravel(), FACES), "The second key has shape (36,)"),
+            ((POINTS, POINTS[1:], FACES), "The keys have 12 and 11 vertices"),
+            ((POINTS[:3], POINTS[:3], FACES[:0]), "The mesh has 3 vertices; at least 4"),
+            ((POINTS[:0], POINTS[:0], FACES[:0]), "The mesh has 0 vertices; at least 4"),
+            ((with_value(POINTS, (7, 1), np.nan), POINTS, FACES), "Vertex 7 of the first key"),
+            ((POINTS, with_value(POINTS, (3, 2), -np.inf), FACES), "Vertex 3 of the second key"),
+            ((POINTS * [1, 1, 0], POINTS, FACES), "All vertices of the first key lie in one plane"),
+            ((POINTS, POINTS * [0, 1, 0], FACES), "All vertices of the second key lie in one plane, line"),
+            ((POINTS, np.ones_like(POINTS), FACES), "All vertices of the second key lie in one plane, line or point"),
+            ((POINTS, POINTS, FACES[:, :2]), "faces has shape (20, 2)"),
+            ((POINTS, POINTS, FACES.astype(float)), "faces holds float64 values"),
+            ((POINTS, POINTS, FACES + 1), "faces refers to a vertex outside 0..11"),
+            ((POINTS, POINTS, FACES - 1), "faces refers to a vertex outside 0..11"),
+            ((POINTS, POINTS, FACES, FACES), "edges has shape (20, 3)"),
+            ((POINTS, POINTS, FACES, [[0, 12]]), "edges refers to a vertex outside 0..11"),
+        ],
+    )
+    def test_refused_with_a_sentence(self, arguments: tuple[Any, ...], sentence: str) -> None:
+        with pytest.raises(InputError, match=re.escape(sentence)):
+            KeyPair.checked(*arguments)
+
+    @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+    def test_flat_at_any_size_and_place_and_angle(self, size: float) -> None:
+        flat = size * (POINTS * [1, 1, 0] @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0] + 5.0)
+        with pytest.raises(InputError, match="one plane"):
+            KeyPair.checked(POINTS, flat, FACES)
+        KeyPair.checked(size * POINTS, size * (POINTS * [1, 1, 1e-4] + 5.0), FACES)

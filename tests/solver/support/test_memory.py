@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much memory a bake needs is known before it starts."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.support.memory import estimated_mb, machine_limit_mb, require_memory
+
+KEYS = ("Basis", "Up")
+
+
+# Vertices, frames, quality and the megabytes that benchmarks/large.py measured.
+@pytest.mark.parametrize(
+    ("vertices", "frames", "quality", "measured"),
+    [
+        (6890, 7, "normal", 152),
+        (6890, 7, "fine", 170),
+        (6890, 7, "finest", 205),
+        (6890, 49, "fine", 192),
+        (27554, 7, "normal", 236),
+        (27554, 7, "fine", 248),
+        (110210, 7, "normal", 581),
+        (110210, 7, "fine", 601),
+        (110210, 49, "normal", 1007),
+        (440834, 7, "normal", 2010),
+    ],
+)
+def test_the_estimate_is_above_what_was_measured_and_near_it(
+    vertices: int, frames: int, quality: str, measured: float
+) -> None:
+    estimate = estimated_mb(vertices, 1, frames, quality)  # type: ignore[arg-type]
+    assert measured <= estimate * 1.02
+    assert estimate <= 1.3 * measured + 60.0
+
+
+def test_a_hundred_thousand_vertices_need_less_than_4_gb() -> None:
+    for quality in ("normal", "fine", "finest"):
+        assert estimated_mb(100_000, 1, 22, quality) < 4096.0  # type: ignore[arg-type]
+
+
+def test_a_million_vertices_are_refused_before_anything_starts() -> None:
+    points = np.random.default_rng(0).uniform(size=(1_000_000, 3))
+    faces = np.arange(999_999).reshape(-1, 3)
+    no_edges = np.empty((0, 2), dtype=np.int64)
+    task = Task.of_keys({"Basis": points, "Up": points * 2.0}, faces, no_edges, KEYS, times=evenly_spaced(5))
+    with pytest.raises(InputError, match=r"The bake of 1000000 vertices needs about 5\d{3} MB .* its limit is 4096 MB"):
+        task.require_memory(4096)
+    task.require_memory(12_000)
+    task.require_memory(0)  # no limit
+
+
+def test_more_keys_and_frames_need_more() -> None:
+    assert estimated_mb(10**5, 3, 7, "fine") > 2.5 * estimated_mb(10**5, 1, 7, "fine")
+    assert estimated_mb(10**5, 1, 1000, "fine") > 10_000.0
+    assert estimated_mb(10**5, 1, 7, "fine", needs_maps=False) < 300.0
+
+
+def test_the_sentence_says_what_to_do() -> None:
+    with pytest.raises(InputError, match=r"Allow it more, take fewer in-betweens or keys, or bake a coarser mesh"):
+        require_memory(10.0, 5.0, 3)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc/meminfo")
+def test_the_machines_limit_is_less_than_its_memory() -> None:
+    with open("/proc/meminfo") as file:
+        total = int(file.readline().split()[1]) / 1024
+    assert 0.5 * total < machine_limit_mb() < total

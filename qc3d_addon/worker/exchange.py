@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.collision.colliders import Collider
+from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
@@ -24,12 +26,12 @@ _TASK, _OUTCOME = "task.json", "outcome.json"
 def write_task(folder: Path, task: Task) -> None:
     """Put a task into an empty folder."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
-        np.savez(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
+        _write(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
     if task.collider is not None:
-        np.savez(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
+        _write(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
     header = {
         "ends": list(task.pairs),
         "through": task.through,
@@ -66,7 +68,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
     if outcome.bake is not None:
         arrays: dict[str, Any] = {"times": outcome.bake.times, "frames": outcome.bake.frames}
         arrays |= {f"measure {name}": values for name, values in outcome.bake.measures.items()}
-        np.savez(folder / "bake.npz", **arrays)
+        _write(folder / "bake.npz", **arrays)
         report = outcome.bake.report.as_json()
     _write_json(folder / _OUTCOME, {"ends": list(outcome.fits), "report": report})
 
@@ -97,6 +99,10 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
     if not np.isfinite(frames).all():
         raise ValueError("a frame has positions that are not finite")
     return Outcome(maps, Bake(times, frames, BakeReport.from_json(header["report"]), measures))
+
+
+def _write(path: Path, **arrays: NDArray[Any]) -> None:
+    write_arrays(path, arrays, is_compressed=False)
 
 
 def _write_json(path: Path, values: dict[str, Any]) -> None:

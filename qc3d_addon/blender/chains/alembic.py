@@ -10,11 +10,15 @@ from pathlib import Path
 import bpy
 
 from ...solver.errors import InputError
-from ...solver.files.npz import replacing
-from .. import compat
+from ...solver.files.atomic import replacing, require_room
+from .. import compat, native_files
 from ..keys import shape_keys, slider
 from ..store.records import Chain
 from .absolute_copy import copied
+
+# Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
+_BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
+_BYTES_BESIDE = 2**20
 
 
 def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
@@ -45,14 +49,17 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)
+        require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:
+            native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
                     filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
                 )
             except RuntimeError as error:
-                raise InputError(f"{path} cannot be written: {error}") from error
-            if result != {'FINISHED'} or not unfinished.exists():
+                words = native_files.words(error, unfinished, path)
+                raise InputError(f"{path} cannot be written: {words}.") from error
+            if result != {'FINISHED'}:
                 raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
 
 
@@ -62,3 +69,22 @@ def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: 
         if obj is not None:  # as one that has just been removed
             obj.select_set(obj in objects, view_layer=layer)
     layer.objects.active = active
+
+
+def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:
+    """More bytes than the file will have. Where the disk gets full, Blender's exporter ends Blender.
+
+    The exporter evaluates modifiers as for a rendering, all but a subdivision surface at the end; the copy is set to
+    show in the viewport what that gives.
+    """
+    shown = [modifier for modifier in copy.modifiers if modifier.show_render]
+    if shown and shown[-1].type == 'SUBSURF' and shown[-1].subdivision_type == 'CATMULL_CLARK':
+        shown.pop()
+    for modifier in copy.modifiers:
+        modifier.show_viewport = modifier in shown
+        if hasattr(modifier, "render_levels"):
+            modifier.levels = modifier.render_levels
+    mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
+    corners = len(mesh.vertices) + len(mesh.loops)
+    once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
+    return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

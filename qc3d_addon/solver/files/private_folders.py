@@ -78,7 +78,8 @@ class PrivateFolder:
         For files that have to be written in the place where they will stay. There is no such file yet.
         """
         assert self._mark is not None
-        name = f"{PREFIX}{secrets.token_hex(16)}{suffix}"
+        name = f"{PREFIX}{secrets.token_hex(16)}"
+        name += suffix if _BESIDE.fullmatch(name + suffix) else ""
         _write_whole(self._mark, f"{name}\n")
         return self.path.with_name(name)
 

@@ -21,7 +21,7 @@ from qc3d_addon.solver.files.private_folders import PREFIX, PrivateFolder, remov
 
 from .commands import listing
 
-NOBODY = 65534
+ANOTHER = 54321  # a user
 MARK = "in_use"
 
 
@@ -79,7 +79,7 @@ class TestWhatAKilledProcessLeft:
     def test_of_another_user_stays(self, tmp_path: Path) -> None:
         left = abandoned(tmp_path)
         try:
-            os.chown(left, NOBODY, -1)
+            os.chown(left, ANOTHER, -1)
         except PermissionError:
             pytest.skip("only root may give files away")
         remove_abandoned(tmp_path)
@@ -88,7 +88,7 @@ class TestWhatAKilledProcessLeft:
     def test_with_a_mark_of_another_user_stays(self, tmp_path: Path) -> None:
         left = abandoned(tmp_path)
         try:
-            os.chown(left / MARK, NOBODY, -1)
+            os.chown(left / MARK, ANOTHER, -1)
         except PermissionError:
             pytest.skip("only root may give files away")
         remove_abandoned(tmp_path)

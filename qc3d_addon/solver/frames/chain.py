@@ -81,6 +81,7 @@ def chain_frames(
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
     notes += crossing_notes(crossings, wanted)
+    notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",
         mode=options.mode,

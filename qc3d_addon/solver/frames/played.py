@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..collision.self_crossings import PairCrossings
+from ..collision.self_crossings import CrossingLimit, PairCrossings
 from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
 from ..settings import FrameOptions, PlayOptions
@@ -102,13 +102,14 @@ def played(
     worst = int(missed.argmax())
     positions, segments, local = _between(weights.knots, frames, len(pairs))
     shown = weights.played(shapes.frames, positions)
-    stretch, crossings, folds = 0.0, np.zeros(len(positions), dtype=np.int64), 0
+    crossings: list[int | None] = []
+    stretch, folds = 0.0, 0
     volumes: list[float] = []
     for number, pair in enumerate(pairs):
         members = np.flatnonzero(segments == number)
         stretch = max(stretch, worst_excess(pair, shown[members]).excess)
         volumes += _volume_deviations(pair, shown[members], local[members])
-        crossings[members] = _new_crossings(pair, shown[members])
+        crossings += _new_crossings(pair, shown[members])
         if fits:
             first, last = np.searchsorted(weights.knots, bake.times[moments.keys[number : number + 2]])
             knots, maps = weights.knots[first : last + 1], shapes.maps[first : last + 1]
@@ -122,7 +123,7 @@ def played(
         worst_stretch=stretch,
         volume=max(volumes, default=None),
         folds=folds if fits else None,
-        crossings=int(crossings.max(initial=0)),
+        crossings=None if None in crossings else max((count or 0 for count in crossings), default=0),
     )
     notes = [*shapes.report.notes]
     if 0.0 < options.tolerance < missed[worst]:
@@ -130,8 +131,8 @@ def played(
             f"All {len(chosen) - len(moments.keys)} in-betweens that a tolerance can make miss it: vertices are up to "
             f"{missed[worst]:.2g} off. Choose more by their number, or a larger tolerance."
         )
-    if report.crossings > max(shapes.report.crossings):
-        notes += crossing_notes(crossings.tolist(), positions)
+    if CrossingLimit.left(crossings) > CrossingLimit.left(shapes.report.crossings):
+        notes += [note for note in crossing_notes(crossings, positions) if note not in notes]
     return replace(shapes, report=replace(shapes.report, played=report, notes=notes))
 
 
@@ -163,7 +164,7 @@ def _volume_deviations(pair: KeyPair, shapes: Floats, times: Floats) -> list[flo
     return found
 
 
-def _new_crossings(pair: KeyPair, shapes: Floats) -> list[int]:
+def _new_crossings(pair: KeyPair, shapes: Floats) -> list[int | None]:
     """Crossing pairs of triangles of each shape (p, n, 3) beyond those of the worse key."""
     crossings = PairCrossings(pair)
     return list(in_threads(crossings.excess, shapes))

@@ -6,12 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ class PlayedReport:
         Folded tetrahedra of the maps through those of the frames that cannot be unfolded as frames are, the most at one
         position; None in mode ``straight``.
     crossings
-        Pairs of triangles that cross beyond what the worse of the two keys has, the most at one position.
+        Pairs of triangles that cross beyond what the worse of the two keys has, the most at one position; None where
+        that is not known.
     """
 
     weights: str
@@ -97,7 +100,7 @@ class PlayedReport:
     worst_stretch: float
     volume: float | None
     folds: int | None
-    crossings: int
+    crossings: int | None
 
 
 @dataclass
@@ -118,6 +121,7 @@ class BakeReport:
         Of the fitted maps and of the frames' maps.
     crossings
         For each frame, pairs of triangles that cross beyond what the worse of its keys has; a key's own frame has 0.
+        None where so many triangles lie over each other that the search was given up.
     certificates
         For each frame; empty in mode ``straight``.
     residual
@@ -131,7 +135,7 @@ class BakeReport:
     peak_memory_mb
         The most memory that the process has held, in megabytes; None where the system does not tell.
     collider_crossings
-        For each frame, pairs of triangles of which one is a collider's; None without colliders.
+        For each frame, pairs of triangles of which one is a collider's, or None as above; None without colliders.
     played
         What a control plays between the frames; None where none was asked for.
     notes
@@ -146,14 +150,14 @@ class BakeReport:
     vertices: int
     tetrahedra: int
     folds: Folds
-    crossings: list[int]
+    crossings: list[int | None]
     certificates: list[Certificate]
     residual: Residual | None
     worst_stretch: WorstStretch
     key_error: float
     seconds: dict[str, float]
     peak_memory_mb: float | None
-    collider_crossings: list[int] | None = None
+    collider_crossings: list[int | None] | None = None
     played: PlayedReport | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -186,15 +190,24 @@ class BakeReport:
         return cls(**parts)
 
 
-def _at(counts: list[int] | None, chosen: list[int]) -> list[int] | None:
+def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
     return None if counts is None else [counts[index] for index in chosen]
 
 
-def crossing_notes(crossings: Sequence[int], times: Floats, subject: str = "itself") -> list[str]:
-    """A sentence about the frame at ``times`` (k,) that crosses ``subject`` most, if one does."""
-    if not any(crossings):
-        return []
-    worst = int(np.argmax(crossings))
-    beyond = " more than a key" if subject == "itself" else ""
-    pairs = f"{crossings[worst]} {'pair' if crossings[worst] == 1 else 'pairs'} of triangles"
-    return [f"The frame at {times[worst]:.3g} crosses {subject} in {pairs}{beyond}."]
+def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str = "itself") -> list[str]:
+    """Sentences about the frame at ``times`` (k,) that crosses ``subject`` most, and about frames of which that is not
+    known, where there are any."""
+    notes = []
+    counts = [count or 0 for count in crossings]
+    if any(counts):
+        worst = int(np.argmax(counts))
+        beyond = " more than a key" if subject == "itself" else ""
+        pairs = f"{counts[worst]} {'pair' if counts[worst] == 1 else 'pairs'} of triangles"
+        notes.append(f"The frame at {times[worst]:.3g} crosses {subject} in {pairs}{beyond}.")
+    if None in crossings:
+        notes.append(
+            f"Whether the mesh crosses {subject} is not known in {crossings.count(None)} of {len(crossings)} frames: "
+            "so many triangles lie over each other there that looking would take too long; remove those that are "
+            "there many times over."
+        )
+    return notes

@@ -93,7 +93,8 @@ def draw(path: Path) -> None:
             axes.add_patch(box)
             count = sizes[room]
             text = room if count == 1 else f"{room}\n{count} modules"
-            axes.text(x, y, text, ha="center", va="center", fontsize=11, zorder=4, color="white" if color in _DARK else "black")
+            ink = "white" if color in _DARK else "black"
+            axes.text(x, y, text, ha="center", va="center", fontsize=11, zorder=4, color=ink)
     axes.axhline(1.15 * (len(SOLVER_FLOORS) - 0.5), color="black", linewidth=1.0, linestyle=":")
     note = "solver/: numpy and scipy only.\nArrays, errors and settings\nare imported from everywhere."
     axes.text(-4.4, 1.15 * (len(SOLVER_FLOORS) - 0.5) - 0.12, note, va="top", fontsize=10)

@@ -89,6 +89,14 @@ class PrivateFolder:
         remove(self.path, mark)
 
 
+def temporary_place() -> str:
+    """Where temporary files go, for a sentence."""
+    try:
+        return tempfile.gettempdir()
+    except OSError:  # no folder that would do was found
+        return "any of the places for them"
+
+
 def remove(folder: Path, mark: BinaryIO | None = None) -> None:
     """Remove a private folder, its mark last, so that a later sweep finds what could not be removed.
 

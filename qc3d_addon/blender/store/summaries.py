@@ -60,7 +60,7 @@ class Summary:
     folds
         Number of inverted tetrahedra in all in-betweens; None where there was no map.
     crossings
-        Number of pairs of triangles that cross in an in-between beyond those of its keys.
+        Number of pairs of triangles that cross in an in-between beyond those of its keys; None where it is not known.
     worst
         Where the in-betweens stretch or shrink most beyond their keys; None where that was not measured.
     residual
@@ -75,7 +75,7 @@ class Summary:
     engine: str
     seconds: float
     folds: int | None
-    crossings: int
+    crossings: int | None
     worst: WorstPlace | None
     residual: float | None
     collider_crossings: int | None = None
@@ -92,7 +92,7 @@ class Summary:
             engine=report.engine,
             seconds=sum(report.seconds.values()),
             folds=_summed(report.folds.frames, chosen),
-            crossings=sum(report.crossings[step] for step in chosen),
+            crossings=_summed(report.crossings, chosen),
             worst=WorstPlace(worst.excess, float(times[worst.frame]), worst.vertex),
             residual=None if report.residual is None else report.residual.rms,
             collider_crossings=_summed(report.collider_crossings, chosen),
@@ -111,9 +111,8 @@ class Summary:
         if values is None or values == {}:
             return None
         found = dict(stored.plain_dict(values))
-        for name in ("count", "crossings"):
-            found[name] = stored.whole(found[name], 0, _MOST)
-        for name in ("folds", "collider_crossings"):
+        found["count"] = stored.whole(found["count"], 0, _MOST)
+        for name in ("folds", "crossings", "collider_crossings"):
             if found.get(name) is not None:
                 found[name] = stored.whole(found[name], 0, _MOST)
         if found["residual"] is not None:
@@ -125,5 +124,7 @@ class Summary:
         return cls(**found)
 
 
-def _summed(counts: list[int] | None, chosen: NDArray[np.int64]) -> int | None:
-    return None if counts is None else sum(counts[step] for step in chosen)
+def _summed(counts: Sequence[int | None] | None, chosen: NDArray[np.int64]) -> int | None:
+    """The sum over the chosen frames; None where nothing, or not everything, is known."""
+    known = [None if counts is None else counts[step] for step in chosen]
+    return None if None in known else sum(count or 0 for count in known)

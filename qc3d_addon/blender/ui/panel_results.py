@@ -115,10 +115,11 @@ def _draw_result(
     facts.label(text=f"{result.count} in-betweens{seconds}")
     counts = {what: count for name, what in _PROBLEMS.items() if (count := getattr(result, name)) is not None}
     problems = [f"{count} {what}" for what, count in counts.items() if count]
-    facts.label(
-        text=", ".join(problems) or f"No {', no '.join(counts)}",
-        icon='ERROR' if problems else 'CHECKMARK',
-    )
+    if counts:
+        facts.label(
+            text=", ".join(problems) or f"No {', no '.join(counts)}",
+            icon='ERROR' if problems else 'CHECKMARK',
+        )
     if result.residual is None:
         facts.label(text="Straight blend, without a map")
     else:

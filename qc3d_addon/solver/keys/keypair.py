@@ -22,6 +22,8 @@ Ends = tuple[str, str]
 # Cubes of what lies between, and squares of its areas, still are numbers.
 _SMALLEST, LARGEST = 1e-75, 1e75
 _MOST_GROWTH = 1e10
+# Where single precision tells positions only this part of a key's size apart, its shape suffers.
+_COARSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,10 @@ class KeyPair:
         if len(first) < 4:
             raise InputError(f"The mesh has {len(first)} vertices; at least 4 are needed to span a volume.")
         for key, name in ((first, "first"), (second, "second")):
-            _require_volume(key, name)
+            try:
+                _require_volume(key, name)
+            except InputError as error:
+                raise _lost_far_away(first, second) or error from None
         _require_like_sizes(first, second)
         triangles = _indices(faces, 3, len(first), "faces")
         wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
@@ -76,6 +81,12 @@ class KeyPair:
     def welding(self) -> tuple[Ints, Ints]:
         """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,)."""
         return welded(self.key0, self.key1)
+
+    @cached_property
+    def far_away(self) -> str | None:
+        """A sentence where a key lies so far from its origin that single precision has lost much of its shape."""
+        error = _lost_far_away(self.key0, self.key1)
+        return None if error is None else str(error)
 
 
 def consecutive_pairs(
@@ -107,6 +118,22 @@ def consecutive_pairs(
             with naming_pair(first, second, through):
                 pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges)
     return pairs
+
+
+def _lost_far_away(first: Floats, second: Floats) -> InputError | None:
+    """The error to raise where the cause is a far offset in single precision."""
+    size = max(float(np.ptp(key, axis=0).max()) for key in (first, second))
+    for key, name in ((first, "first"), (second, "second")):
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            single = key.astype(np.float32)
+            step = float(np.spacing(np.abs(single).max()))
+        if step > _COARSE * size > 0.0 and (single == key).all():
+            return InputError(
+                f"The {name} key lies so far from its origin, at {np.abs(key).max():.1e}, that single precision tells "
+                f"positions only {step:.1g} apart there, {step / size:.1%} of its size, and has lost much of its "
+                "shape; model it near the origin and move the object instead."
+            )
+    return None
 
 
 def _positions(key: ArrayLike, name: str) -> Floats:

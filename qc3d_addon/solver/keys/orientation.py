@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
@@ -19,27 +21,66 @@ _MOST_SHARE = 0.5
 # A part is a mirror image where this fits so much better than any turn, and turns leave so much, relative to its size.
 _BETTER = 0.25
 _LEFT_BY_TURNS = 0.1
-# Volumes below this part of the size cubed are none.
-_LEAST_VOLUME = 1e-9
+# Volumes below this part of the size cubed are none; parts that are as small as the second are named all the same.
+_LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
+# What is turned inside out holds, for its surface, at least this part of the volume that it held before: what crosses
+# itself all over or is flattened holds next to none, on whichever side.
+_AS_FULL = 0.3
 
 
-def require_reachable(pair: KeyPair) -> None:
-    """Check that a motion of the volume can lead from the first key to the second.
+@dataclass(frozen=True)
+class Reversal:
+    """How much of a mesh no motion of a volume carries from the first key to the second.
+
+    Parameters
+    ----------
+    mirrored : float
+        Of the first key's surface, 0..1: components that are mirror images or turned inside out.
+    tangled : float
+        The same for closed components that cross themselves so far, or are so flat, that their signed volume has the
+        other sign.
+    parts : int
+        How many components are mirrored.
+    """
+
+    mirrored: float
+    tangled: float
+    parts: int
+
+
+def require_reachable(pair: KeyPair) -> Reversal:
+    """Check that a motion of the volume can lead from the first key to the second; returns what it does not reach.
 
     Raises
     ------
     InputError
-        If more than half of the surface is mirrored or turned inside out: no map that keeps orientation does that.
+        If more than half of the surface is mirrored, turned inside out or tangled: no map that keeps orientation does
+        that.
     """
-    if mirrored_share(pair) > _MOST_SHARE:
+    found = reversal(pair)
+    if found.mirrored + found.tangled <= _MOST_SHARE:
+        return found
+    if pair.far_away is not None:
+        raise InputError(pair.far_away)
+    if found.mirrored >= found.tangled:
         raise InputError(
             "The second key is mirrored or turned inside out: no motion of a volume leads there. Choose the mode "
             "straight, which blends along straight lines, or mirror the second key back."
         )
+    raise InputError(
+        "The second key crosses itself so far, or is so flat, that more of it faces inwards than outwards: no motion "
+        "of a volume leads there. Choose the mode straight, which blends along straight lines, or repair the key."
+    )
 
 
 def mirrored_share(pair: KeyPair) -> float:
-    """The part of the first key's surface, 0..1, whose components are mirrored or turned inside out in the second.
+    """The part of the first key's surface, 0..1, that is mirrored, turned inside out or tangled in the second."""
+    found = reversal(pair)
+    return found.mirrored + found.tangled
+
+
+def reversal(pair: KeyPair) -> Reversal:
+    """What is mirrored, turned inside out or tangled between the keys.
 
     Closed components are told by the sign of the volume that they enclose. Others are told by what a rotation with
     scaling and what a reflection with scaling leave of them (Kabsch 1976): flat ones, whose mirror image a turn
@@ -50,13 +91,20 @@ def mirrored_share(pair: KeyPair) -> float:
     faces = group[pair.faces]
     labels = vertex_components(unique_edges(sides(faces)), len(vertices))
     closed = ClosedComponents(faces, labels)
-    first, second = (np.where(np.abs(found) > _LEAST_VOLUME, found, 0.0) for found in map(closed.volumes, keys))
-    is_closed = np.zeros(len(first), dtype=bool)
+    volumes = np.stack([closed.volumes(key) for key in keys])
+    count = volumes.shape[1]
+    is_closed = np.zeros(count, dtype=bool)
     is_closed[labels[closed.faces[:, 0]]] = True
-    mirrored = np.where(is_closed, first * second < 0.0, _are_mirror_images(keys[0], keys[1], labels))
-    surface = areas(keys[0], faces)
-    total = float(surface.sum())
-    return float(surface[mirrored[labels[faces[:, 0]]]].sum()) / total if total > 0.0 else 0.0
+    is_image = _are_mirror_images(keys[0], keys[1], labels)
+    flips, least = volumes[0] * volumes[1] < 0.0, np.abs(volumes).min(axis=0)
+    surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
+    full = np.abs(volumes) / np.maximum(surface, 1e-100) ** 1.5
+    is_real = is_image | (full[1] > _AS_FULL * full[0])
+    is_reversed = np.where(is_closed, flips & (least > _LEAST_VOLUME), is_image)
+    is_part = np.where(is_closed, flips & (least > _LEAST_OF_A_PART), is_image)
+    total = max(float(surface[0].sum()), 1e-300)
+    mirrored, tangled = (float(surface[0] @ (is_reversed & chosen)) / total for chosen in (is_real, ~is_real))
+    return Reversal(mirrored, tangled, int((is_part & is_real).sum()))
 
 
 def _in_unit_size(key: Floats) -> Floats:

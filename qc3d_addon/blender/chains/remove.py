@@ -42,7 +42,7 @@ def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
     """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
     if chain.slider not in owner:
         return []
-    if slider.problem(owner, chain.slider) is not None:
+    if not slider.is_number(owner, chain.slider):
         return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
     readers = sum(1 for curve in _drivers() if slider.reads(curve.driver, owner, chain.slider))
     if readers:

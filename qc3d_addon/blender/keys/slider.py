@@ -39,15 +39,19 @@ def problem(obj: bpy.types.Object, name: str) -> str | None:
     """Why the slider of that name cannot play anything, or None. Quick enough for a panel."""
     if name not in obj:
         return f"The slider '{name}' was deleted; re-bake it first."
-    value = obj[name]
-    if not isinstance(value, (bool, int, float)):
+    if not is_number(obj, name):
         return (
             f"The slider '{name}' of '{obj.name}' is not a number any more; delete that custom property, then re-bake "
             "to have it again."
         )
-    if math.isnan(value):
+    if math.isnan(obj[name]):
         return f"The slider '{name}' of '{obj.name}' has no value (NaN); give it one, or mend what drives it."
     return None
+
+
+def is_number(obj: bpy.types.Object, name: str) -> bool:
+    """Whether the slider has a type that can play anything: the user may give it any other."""
+    return isinstance(obj[name], (bool, int, float))
 
 
 def require(obj: bpy.types.Object, name: str) -> None:

@@ -28,7 +28,7 @@ from .summaries import Summary
 PROPERTY = "qc3d"
 VERSION = 1  # of what is written; records from before there was a number have the same form
 
-_LAST_FRAME = 2**31 - 1
+_MOST_FRAME = 2**31  # from 0, either way
 _LONGEST_KEY = 2 * LIMIT  # bytes: a mirror image goes through keys of names made up for it
 _LONGEST_FINGERPRINT = 1000
 
@@ -86,7 +86,7 @@ class Chain:
             raise ValueError("one key for two steps")
         keyframes = found.pop("keyframes", None)
         if keyframes is not None:
-            first, last = (stored.whole(frame, -_LAST_FRAME, _LAST_FRAME) for frame in stored.plain_list(keyframes))
+            first, last = (stored.whole(frame, -_MOST_FRAME, _MOST_FRAME) for frame in stored.plain_list(keyframes))
             if first >= last:
                 raise ValueError("keyframes without time between them")
             keyframes = (first, last)

@@ -161,6 +161,8 @@ class TestNaN:
             assert str(caught.value).strip() == f"Error: {self.SENTENCE}", name
             assert repr(state()) == before
         assert drawn(baked).texts[0] == self.SENTENCE
+        assert bpy.ops.qc3d.remove() == {"FINISHED"}
+        assert SLIDER not in baked
 
     def test_the_panel_says_that_blender_stopped_it_and_re_bake_starts_it_again(
         self, baked: bpy.types.Object, shown: Shown

@@ -20,7 +20,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns
     -------
-    0 when it is done; 2 when the input is not usable, with one sentence on standard error; 130 when interrupted.
+    0 when it is done; 1 when all files are written, but not what was to be said on standard output; 2 when it cannot be
+    done, with one sentence on standard error; 130 when interrupted.
     """
     problem = None
     try:
@@ -43,11 +44,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     finally:
         speech.flush()  # the texts of --help and --version too
     unheard = speech.take_unheard()
-    if problem is None and unheard is not None:
-        problem = f"Standard output cannot be written: {reason(unheard)}; all files are complete."
     if problem is not None:
         speech.note(problem)
         return 2
+    if unheard is not None:
+        speech.note(f"Standard output cannot be written: {reason(unheard)}; all files are complete.")
+        return 1
     return 0
 
 

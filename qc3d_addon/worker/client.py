@@ -11,7 +11,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time as clock
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from pathlib import Path
 
 from ..solver import errors
 from ..solver.errors import InputError, QC3DError, WorkerError, with_remedy
-from ..solver.files.private_folders import PrivateFolder
+from ..solver.files.private_folders import PrivateFolder, temporary_place
 from ..solver.frames.task import Outcome, Task
 from ..solver.support.child_python import interpreter
 from ..solver.support.progress import STAGES, Progress
@@ -213,16 +212,9 @@ _GARBLED = (
 
 def _not_started(error: OSError) -> WorkerError:
     return WorkerError(
-        f"The work cannot be started in a process of its own, with temporary files in {_temporary_place()}: "
+        f"The work cannot be started in a process of its own, with temporary files in {temporary_place()}: "
         f"{with_remedy(error)}."
     )
-
-
-def _temporary_place() -> str:
-    try:
-        return tempfile.gettempdir()
-    except OSError:  # no folder that would do was found
-        return "any of the places for them"
 
 
 def _out_of_memory(limits: Limits) -> str:

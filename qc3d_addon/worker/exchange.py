@@ -18,7 +18,7 @@ from ..solver.frames.bake import Bake
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
 from ..solver.keys.keypair import KeyPair
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
 _TASK, _OUTCOME = "task.json", "outcome.json"
 
@@ -37,6 +37,7 @@ def write_task(folder: Path, task: Task) -> None:
         "through": task.through,
         "fit_options": asdict(task.fit_options),
         "frame_options": asdict(task.frame_options),
+        "play": None if task.play is None else asdict(task.play),
     }
     _write_json(folder / _TASK, header)
 
@@ -57,7 +58,10 @@ def read_task(folder: Path) -> Task:
         with np.load(folder / "collider.npz", allow_pickle=False) as stored:
             collider = Collider(stored["shapes"], stored["faces"])
     options = FitOptions(**header["fit_options"]), FrameOptions(**header["frame_options"])
-    return Task(pairs, tuple(header["through"]), *options, times, kept, collider)
+    play = header["play"]
+    if play is not None:
+        play = PlayOptions(**{**play, "also_at": tuple(play["also_at"])})
+    return Task(pairs, tuple(header["through"]), *options, times, kept, collider, play)
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
@@ -88,13 +92,15 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
     }
     if maps.keys() != (task.pairs.keys() if task.needs_fits else set()):
         raise ValueError("the maps belong to other keys")
-    if not len(task.times):
+    if not task.frame_count:
         return Outcome(maps, None)
     with np.load(folder / "bake.npz", allow_pickle=False) as stored:
         times, frames = stored["times"], stored["frames"]
         measures = {name.removeprefix("measure "): stored[name] for name in stored.files if name.startswith("measure ")}
     vertices = len(next(iter(task.pairs.values())).key0)
-    if not np.array_equal(times, task.times) or frames.shape != (len(times), vertices, 3):
+    known = task.times if task.moments is None else task.moments.times
+    is_whole = np.array_equal(times, known) if task.play is None else np.isin(times, known).all() and len(times) > 1
+    if not is_whole or frames.shape != (len(times), vertices, 3):
         raise ValueError("the frames are not those asked for")
     if not np.isfinite(frames).all():
         raise ValueError("a frame has positions that are not finite")

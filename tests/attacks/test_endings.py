@@ -9,6 +9,7 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -271,6 +272,8 @@ class TestSeveralAtOnce:
             if (tmp_path / name).exists():
                 text = (tmp_path / name).read_text()
                 assert text == " ".join(text.split()[:2]).join(["", " "]) * 20_000
+        for left in tmp_path.glob(".qc3d-*"):
+            os.utime(left, (0.0, 0.0))  # one that was killed as it made a folder leaves it for a minute
         last = self.start(9, tmp_path, 1)
         last.communicate(timeout=60)
         assert sorted(os.listdir(tmp_path)) == ["new.json", "new.npz"]
@@ -299,17 +302,14 @@ class TestFullTemporaryDisks:
 
     @pytest.fixture
     def full(self, small_disk: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-        import tempfile
-
         monkeypatch.setattr(tempfile, "tempdir", str(small_disk))
         (small_disk / "ballast").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096 - 8192))
         return small_disk
 
+    @needs_tetwild
     def test_with_the_engine_that_needs_one(self, full: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         from qc3d_addon.cli import main
 
-        if unavailable_reason() is not None:
-            pytest.skip(f"tetwild: {unavailable_reason()}")
         assert main.main([*INTERPOLATE, "--engine", "tetwild"]) == 2
         said = capsys.readouterr().err
         assert "qc3d: The meshing engine tetwild cannot work with temporary files in " in said
@@ -319,6 +319,20 @@ class TestFullTemporaryDisks:
         assert os.listdir(full) == ["ballast"]
         assert main.main([*INTERPOLATE, "--engine", "auto"]) == 0  # another engine steps in, and that is said
         assert "No space left on device" in capsys.readouterr().err
+
+    @needs_tetwild
+    def test_where_there_is_no_folder_at_all(
+        self, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from qc3d_addon.cli import main
+
+        def none() -> str:
+            raise FileNotFoundError(2, "No usable temporary directory found")
+
+        monkeypatch.setattr(tempfile, "gettempdir", none)
+        assert main.main([*INTERPOLATE, "--engine", "tetwild"]) == 2
+        assert "in any of the places for them: No usable temporary directory found; make" in capsys.readouterr().err
+        assert main.main([*INTERPOLATE, "--engine", "auto"]) == 0
 
     def test_where_blender_starts_a_bake(self, full: Path) -> None:
         from qc3d_addon.solver.errors import WorkerError

@@ -21,7 +21,7 @@ from qc3d_addon.solver.files.private_folders import PREFIX, PrivateFolder, remov
 
 from .commands import listing
 
-NOBODY = 65534
+ANOTHER = 54321  # a user
 MARK = "in_use"
 
 
@@ -79,7 +79,7 @@ class TestWhatAKilledProcessLeft:
     def test_of_another_user_stays(self, tmp_path: Path) -> None:
         left = abandoned(tmp_path)
         try:
-            os.chown(left, NOBODY, -1)
+            os.chown(left, ANOTHER, -1)
         except PermissionError:
             pytest.skip("only root may give files away")
         remove_abandoned(tmp_path)
@@ -88,7 +88,7 @@ class TestWhatAKilledProcessLeft:
     def test_with_a_mark_of_another_user_stays(self, tmp_path: Path) -> None:
         left = abandoned(tmp_path)
         try:
-            os.chown(left / MARK, NOBODY, -1)
+            os.chown(left / MARK, ANOTHER, -1)
         except PermissionError:
             pytest.skip("only root may give files away")
         remove_abandoned(tmp_path)
@@ -143,7 +143,7 @@ def _with_half_a_mark(folder: Path) -> None:
     with PrivateFolder(folder.parent) as made:
         text = (made / MARK).read_text()
     folder.mkdir()
-    (folder / MARK).write_text(text.splitlines()[0] + "\n")
+    (folder / MARK).write_text(text[:20])
 
 
 def _with_mark_of_another(folder: Path) -> None:
@@ -219,24 +219,41 @@ def test_what_only_looks_like_one_of_ours_stays(make: Callable[[Path], None], na
 def test_random_folders_stay(seed: int, tmp_path: Path) -> None:
     """Names, marks and contents put together at random, from pieces of real ones."""
     choose = random.Random(seed)
-    with PrivateFolder(tmp_path) as made:
-        lines = (made / MARK).read_text().splitlines()
-    for number in range(8):
-        names = [made.name, f"{PREFIX}{number}", f"qc3d-{number}", f"{PREFIX}{'0' * 32}.blend"]
-        folder = tmp_path / choose.choice(names)
-        if folder.exists():
-            continue
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    with PrivateFolder(tmp_path) as one, PrivateFolder(tmp_path) as two, PrivateFolder(elsewhere) as other:
+        sentence = (one / MARK).read_text()
+        starts, ends = [(one.name[:22], two.name[22:]), (other.name[:22], one.name[22:])], [other.name, one.name[:-1]]
+    names = ["".join(pair) for pair in starts] + ends + [f"{one.name}0", one.name.upper(), f"{PREFIX}{'0' * 32}"]
+    for name in choose.sample(names, 4):
+        folder = tmp_path / name
         folder.mkdir()
-        said = [choose.choice([*lines, folder.name, str(folder.stat().st_ino), "", "x" * 9999]) for _ in range(4)]
-        if said[:3] == [lines[0], folder.name, str(folder.stat().st_ino)]:
-            continue  # a perfect forgery, which only the user can make
         mark = folder / choose.choice([MARK, "mark", f"{MARK}.txt"])
-        mark.write_bytes("\n".join(said).encode() + choose.randbytes(9))
-        (folder / "work.blend").write_text("hours")
+        mark.write_bytes(choose.choice([sentence.encode(), b"", sentence[:9].encode(), choose.randbytes(99)]))
+        if choose.random() < 0.5:
+            (folder / "work.blend").write_text("hours")
         make_old(folder)
     before = listing(tmp_path)
     remove_abandoned(tmp_path)
     assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize("half", ["", "in_use", "in_use with a part of its sentence"])
+@pytest.mark.parametrize("what", [None, "work.blend"])
+def test_of_a_folder_that_was_never_finished(half: str, what: str | None, tmp_path: Path) -> None:
+    """A process may be killed as it makes one: that goes when it is old, if nothing else is in it."""
+    with PrivateFolder(tmp_path) as folder:
+        sentence = (folder / MARK).read_text()
+    folder.mkdir()
+    if half:
+        (folder / MARK).write_text(sentence[:20] if half != MARK else "")
+    if what:
+        (folder / what).write_text("hours")
+    remove_abandoned(tmp_path)
+    assert folder.exists()  # it may still be in the making
+    make_old(folder)
+    remove_abandoned(tmp_path)
+    assert folder.exists() == (what is not None)
 
 
 @pytest.mark.parametrize("mode", [0o300, 0o100])

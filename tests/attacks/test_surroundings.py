@@ -48,7 +48,7 @@ class TestStreams:
             with np.load(output) as stored:
                 assert all(np.isfinite(stored[key]).all() for key in stored.files)
         elif name == "bake":
-            assert output.read_bytes()[:7] == b"BLENDER"
+            assert output.read_bytes()[:4] in (b"BLEN", bytes.fromhex("28b52ffd"))  # plain, or compressed as by 5.2
         else:
             assert run(["decompress", str(output), "map.npz", "--output", "back.npz"]).returncode == 0
 
@@ -67,7 +67,7 @@ class TestStreams:
             os.close(writing)
         if arguments == COMPRESS:
             said = done.stderr.decode().strip()
-            assert done.returncode == 2
+            assert done.returncode == 1
             assert said == "qc3d: Standard output cannot be written: Broken pipe; all files are complete."
             assert run(["decompress", "new.qc3d", "map.npz", "--output", "back.npz"]).returncode == 0
         else:
@@ -86,7 +86,7 @@ class TestStreams:
         with (small_disk / "said").open("wb") as said:
             (small_disk / "ballast").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096))
             done = run(COMPRESS, stdout=said, stderr=subprocess.PIPE)
-        assert done.returncode == 2
+        assert done.returncode == 1
         said = done.stderr.decode().strip()
         assert said == "qc3d: Standard output cannot be written: No space left on device; all files are complete."
 

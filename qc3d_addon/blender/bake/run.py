@@ -102,11 +102,17 @@ def _save(new: Path, output: Path, size: int) -> None:
     from ...solver.files.atomic import require_room
 
     native_files.require_short(new, output)
+    problem = None
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(new), copy=True, check_existing=False)
     except RuntimeError as error:
-        require_room(output, size)  # Blender calls a full disk a file that is not there
-        raise InputError(f"{output} cannot be written: {native_files.words(error, new, output)}.") from error
+        problem = native_files.words(error, new, output)
+    else:
+        if new.exists() and not native_files.is_whole(new):
+            problem = "Blender wrote a part of it only"
+    if problem is not None:
+        require_room(output, size)  # Blender calls a full disk a file that is not there, or nothing at all
+        raise InputError(f"{output} cannot be written: {problem}.")
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:

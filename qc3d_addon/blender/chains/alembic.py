@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
@@ -13,6 +14,7 @@ from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
 from ..keys import shape_keys, slider
 from ..store.records import Chain
+from .absolute_copy import copied
 
 # Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
 _BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
@@ -30,28 +32,23 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         If the file cannot be written; what was there is kept.
     """
     scene, layer = context.scene, context.view_layer
-    before = (scene.frame_current, scene.frame_subframe)
-    selected, active = list(context.selected_objects), layer.objects.active
     owner = shape_keys.slider_owner(obj, chain)
-    copy = obj.copy()
-    copy.data = obj.data.copy()
-    collection = bpy.data.collections.new("QC3D export")
-    scene.collection.children.link(collection)
-    collection.objects.link(copy)
-    keys = copy.data.shape_keys
-    try:
+    with ExitStack() as undo:
+        undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
+        undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
+        copy = copied(obj, undo)
+        collection = bpy.data.collections.new("QC3D export")
+        undo.callback(bpy.data.collections.remove, collection)
+        scene.collection.children.link(collection)
+        collection.objects.link(copy)
         copy.animation_data_clear()
         copy[chain.slider] = 0.0
-        for driver in slider.driven_by(keys, chain.slider).values():
+        for driver in slider.driven_by(copy.data.shape_keys, chain.slider).values():
             if driver.variables[0].targets[0].id == owner:
                 driver.variables[0].targets[0].id = copy
-        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider))
-        for frame, value in ((1, 0.0), (frames, 1.0)):
-            curve.keyframe_points.insert(frame, value).interpolation = 'LINEAR'
-        for other in selected:
-            other.select_set(False)
-        copy.select_set(True)
-        layer.objects.active = copy
+        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
+        slider.set_keyframes(curve, (1, frames))
+        _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:
             native_files.require_short(unfinished, path)
@@ -64,19 +61,14 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
                 raise InputError(f"{path} cannot be written: {words}.") from error
             if result != {'FINISHED'}:
                 raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
-    finally:
-        action = copy.animation_data and copy.animation_data.action
-        mesh, key_action = copy.data, keys.animation_data and keys.animation_data.action
-        bpy.data.objects.remove(copy)
-        bpy.data.meshes.remove(mesh)
-        bpy.data.collections.remove(collection)
-        for block in (action, key_action):
-            if block is not None and block.users == 0:
-                bpy.data.actions.remove(block)
-        for other in selected:
-            other.select_set(True)
-        layer.objects.active = active
-        scene.frame_set(before[0], subframe=before[1])
+
+
+def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:
+    """Let these objects be selected and no others."""
+    for obj in layer.objects:
+        if obj is not None:  # as one that has just been removed
+            obj.select_set(obj in objects, view_layer=layer)
+    layer.objects.active = active
 
 
 def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from ..arrays import Bools, Floats, Ints
+from ..keys.keypair import KeyPair
 from ..triangles.topology import sides
 from .box_tree import CrowdedError
 from .crossings import CrossingSearch
@@ -93,3 +94,21 @@ class CrossingLimit:
         """One number for each crossing pair of triangles of which one moves."""
         pairs = self._search.pairs(shape)
         return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])
+
+
+class PairCrossings:
+    """How often shapes between two keys cross themselves beyond the worse key, in the keys' coordinates of any size."""
+
+    def __init__(self, pair: KeyPair) -> None:
+        self._origin = pair.key0[0]
+        # In units in which cubes of coordinates are numbers.
+        self._scale = 1.0 / max(float(np.ptp(key, axis=0).max()) for key in (pair.key0, pair.key1))
+        still = (pair.key0 == pair.key1).all(axis=1)
+        self._limit = CrossingLimit(pair.faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
+
+    def excess(self, shape: Floats) -> int | None:
+        """Crossing pairs of triangles of ``shape`` (n, 3) beyond what the keys have; None where that is not known."""
+        return self._limit.excess(self._scaled(shape))
+
+    def _scaled(self, positions: Floats) -> Floats:
+        return np.asarray((positions - self._origin) * self._scale)

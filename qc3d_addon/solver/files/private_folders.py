@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import secrets
@@ -11,6 +12,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time as clock
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,8 +21,8 @@ from typing import BinaryIO
 
 PREFIX = ".qc3d-"
 _MARK = "in_use"
-# What the first line of the mark says; only a folder with exactly this, its own name and its own number is ever swept.
-_SENTENCE = "QC3D removes this folder, and all that is in it, once the program that made it has ended."
+_SENTENCE = "QC3D removes this folder, and all that is in it, once the program that made it has ended.\n"
+_YOUNG = 60.0  # seconds in which a folder may still be in the making
 _BESIDE = re.compile(r"\.qc3d-[0-9a-f]{32}(\.\w{1,50})?")
 _LONGEST_MARK = 10_000  # bytes
 
@@ -28,7 +30,8 @@ _LONGEST_MARK = 10_000  # bytes
 class PrivateFolder:
     """A new folder that only this user can enter, removed by ``close``; on Windows whoever may enter ``parent`` can.
 
-    A file in it, the mark, is locked while the folder is in use and says whose it is. The system frees the lock when
+    Its name proves that it was made here, by this user, in this place: no other folder, no copy and no folder that was
+    moved has such a name. A file in it, the mark, is locked while the folder is in use. The system frees the lock when
     the process ends, however that happens; every new folder first removes those beside it that nobody uses any more.
 
     Parameters
@@ -50,14 +53,15 @@ class PrivateFolder:
         is_temporary = parent is None
         parent = Path(tempfile.gettempdir()) if parent is None else parent
         remove_abandoned(parent)
-        self.path = Path(os.path.abspath(parent)) / f"{PREFIX}{secrets.token_hex(8)}"
+        start = f"{PREFIX}{secrets.token_hex(8)}"
+        self.path = Path(os.path.abspath(parent)) / f"{start}{_proof(start, parent)}"
         # On Windows a file keeps the access rights of the folder that it was made in when it is moved elsewhere.
         self.path.mkdir(0o777 if sys.platform == "win32" and not is_temporary else 0o700)
         self._mark: BinaryIO | None = None
         try:
             self._mark = (self.path / _MARK).open("x+b", buffering=0)
-            _lock(self._mark)  # before it says whose it is: whoever finds it unlocked and ours may remove it
-            _write_whole(self._mark, "\n".join(_identity(self.path)))
+            _lock(self._mark)  # before it says anything: whoever finds the sentence unlocked may remove the folder
+            _write_whole(self._mark, _SENTENCE)
         except BaseException:
             self.close()
             raise
@@ -74,14 +78,23 @@ class PrivateFolder:
         For files that have to be written in the place where they will stay. There is no such file yet.
         """
         assert self._mark is not None
-        name = f"{PREFIX}{secrets.token_hex(16)}{suffix}"
-        _write_whole(self._mark, name)
+        name = f"{PREFIX}{secrets.token_hex(16)}"
+        name += suffix if _BESIDE.fullmatch(name + suffix) else ""
+        _write_whole(self._mark, f"{name}\n")
         return self.path.with_name(name)
 
     def close(self) -> None:
         """Remove the folder and all in it; nothing happens the second time."""
         mark, self._mark = self._mark, None
         remove(self.path, mark)
+
+
+def temporary_place() -> str:
+    """Where temporary files go, for a sentence."""
+    try:
+        return tempfile.gettempdir()
+    except OSError:  # no folder that would do was found
+        return "any of the places for them"
 
 
 def remove(folder: Path, mark: BinaryIO | None = None) -> None:
@@ -113,42 +126,55 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def _remove_if_abandoned(folder: Path) -> None:
-    if not _is_ours(folder.lstat(), stat.S_ISDIR):  # not what a symbolic link leads to
+    found = folder.lstat()  # not what a symbolic link leads to
+    if not (_is_ours(found, stat.S_ISDIR) and folder.name == _proven(folder)):
         return
+    is_old = clock.time() - found.st_mtime > _YOUNG
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    with open(os.open(folder / _MARK, flags), "r+b", buffering=0) as mark:
-        if not _is_ours(os.fstat(mark.fileno()), stat.S_ISREG):
+    try:
+        opened = os.open(folder / _MARK, flags)
+    except FileNotFoundError:  # killed as it made the folder; what has anything in it stays
+        if is_old:
+            folder.rmdir()
+        return
+    with open(opened, "r+b", buffering=0) as mark:
+        if not _is_ours(os.fstat(opened), stat.S_ISREG):
             return
-        # Only what is ours is locked: the process that makes a folder must get its lock.
-        if _lines(mark)[:3] == _identity(folder) and _lock(mark):
+        said = mark.read(len(_SENTENCE)).decode("utf-8", errors="replace")
+        is_half_made = is_old and _SENTENCE.startswith(said) and os.listdir(folder) == [_MARK]
+        if (said == _SENTENCE or is_half_made) and _lock(mark):
             remove(folder, mark)
+
+
+def _proof(start: str, parent: Path) -> str:
+    """What the name of a private folder that begins so ends with, for this user in this place."""
+    user = os.geteuid() if hasattr(os, "geteuid") else 0
+    return hashlib.sha256(f"{start} {user} {parent.stat().st_ino}".encode()).hexdigest()[:16]
+
+
+def _proven(folder: Path) -> str:
+    """The only name that begins as that of ``folder`` does and that this user's private folders have there."""
+    start = folder.name[: len(PREFIX) + 16]
+    return f"{start}{_proof(start, folder.parent)}"
 
 
 def _is_ours(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     return is_kind(found.st_mode) and (not hasattr(os, "geteuid") or found.st_uid == os.geteuid())
 
 
-def _identity(folder: Path) -> list[str]:
-    """What the mark of a folder says; that of a copy, or of a folder renamed, is another."""
-    return [_SENTENCE, folder.name, str(folder.lstat().st_ino)]
-
-
-def _write_whole(mark: BinaryIO, lines: str) -> None:
-    data = lines.encode() + b"\n"
+def _write_whole(mark: BinaryIO, text: str) -> None:
+    data = text.encode()
     while data:
         data = data[mark.write(data) :]  # what finds no room the first time is refused the second time
 
 
-def _lines(mark: BinaryIO) -> list[str]:
-    """The whole lines of a mark; one that was not finished is none."""
-    mark.seek(0)
-    return mark.read(_LONGEST_MARK).decode("utf-8", errors="replace").split("\n")[:-1]
-
-
 def _siblings(folder: Path, mark: BinaryIO | None) -> list[Path]:
     """The files beside a folder that belong to it, as its mark says, and what Blender calls them as it writes."""
-    names = [] if mark is None else [name for name in _lines(mark)[3:] if _BESIDE.fullmatch(name)]
-    return [folder.with_name(name + end) for name in names for end in ("", "@")]
+    if mark is None:
+        return []
+    mark.seek(0)
+    whole_lines = mark.read(_LONGEST_MARK).decode("utf-8", errors="replace").split("\n")[1:-1]
+    return [folder.with_name(name + end) for name in whole_lines if _BESIDE.fullmatch(name) for end in ("", "@")]
 
 
 def _remove(path: Path) -> bool:

@@ -22,6 +22,7 @@ from .fitted_map import FittedMap
 FORMAT_VERSION = 2
 _SEAL_LENGTH = 32
 _DAMAGED = "The stored map is damaged; fit the keys again."
+_UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)
 
 
 def fingerprint(pair: KeyPair) -> str:
@@ -58,6 +59,34 @@ def to_bytes(fitted: FittedMap) -> bytes:
     return _seal(buffer.getvalue()) + buffer.getvalue()
 
 
+def _is_whole(data: bytes) -> bool:
+    return data[:_SEAL_LENGTH] == _seal(data[_SEAL_LENGTH:])
+
+
+def _opened(data: bytes) -> Archive:
+    return Archive(io.BytesIO(data[_SEAL_LENGTH:]), "the stored map", "a mesh and maps are needed")
+
+
+def why_unusable(data: bytes) -> str | None:
+    """Why ``from_bytes`` would refuse bytes that were stored for the same keys, without unpacking them; or None.
+
+    Returns
+    -------
+    The end of a sentence about the stored map: "is damaged", or by which version it was stored.
+    """
+    if not _is_whole(data):
+        return "is damaged"
+    try:
+        version = json.loads(bytes(_opened(data).read(["header"])["header"]))["version"]
+    except (InputError, *_UNREADABLE):
+        return "is damaged"
+    if not isinstance(version, int):
+        return "is damaged"
+    if version == FORMAT_VERSION:
+        return None
+    return f"was stored by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
+
+
 def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     """Restore a map that ``to_bytes`` stored.
 
@@ -67,11 +96,10 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
         If the bytes are damaged, of another version, or belong to other keys.
     """
     # Unpacking what is damaged can fail in many ways, or not at all.
-    if data[:_SEAL_LENGTH] != _seal(data[_SEAL_LENGTH:]):
+    if not _is_whole(data):
         raise InputError(_DAMAGED)
     try:
-        archive = Archive(io.BytesIO(data[_SEAL_LENGTH:]), "the stored map", "a mesh and maps are needed")
-        stored = archive.read(("header", "points", "maps", "turns", "tets"))
+        stored = _opened(data).read(("header", "points", "maps", "turns", "tets"))
     except InputError as error:
         raise InputError(_DAMAGED) from error
     try:
@@ -85,7 +113,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
         notes = tuple(str(note) for note in header["notes"])
         points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
         tets = np.asarray(stored["tets"], dtype=np.int64)
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+    except _UNREADABLE as error:
         raise InputError(_DAMAGED) from error
     if owner != fingerprint(pair):
         raise InputError("The stored map belongs to other keys or another mesh; fit the keys again.")

@@ -107,7 +107,8 @@ def chain_frames(
             report.collider_crossings = collider.crossings(frames, pairs[0].faces)
         notes += crossing_notes(report.collider_crossings, wanted, "the colliders")
     report.notes = list(dict.fromkeys(notes))
-    return Bake(wanted, frames, report, measures)
+    maps = tuple(frame.values for frame in ordered if frame.values is not None)
+    return Bake(wanted, frames, report, measures, maps)
 
 
 def _put_keys(made: dict[int, Frame], members: Ints, times: Floats, pair: KeyPair) -> float:

@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,43 @@ class WorstStretch:
     vertex: int
 
 
+@dataclass(frozen=True)
+class PlayedReport:
+    """What a control plays between its shapes, looked at in several places between every two of them.
+
+    Parameters
+    ----------
+    weights
+        ``smooth`` or ``hats``.
+    positions
+        In how many places it was looked at.
+    distance
+        The largest distance of a vertex from where the computed motion has it, over the bounding-box diagonal.
+    distance_at
+        The position of the control where that is.
+    worst_stretch
+        The largest excess of an edge over its lengths in the two keys.
+    volume
+        The largest deviation of an enclosed volume from what lies between its two keys, relative to that; None where
+        nothing is closed.
+    folds
+        Folded tetrahedra of the maps through those of the frames that cannot be unfolded as frames are, the most at one
+        position; None in mode ``straight``.
+    crossings
+        Pairs of triangles that cross beyond what the worse of the two keys has, the most at one position; None where
+        that is not known.
+    """
+
+    weights: str
+    positions: int
+    distance: float
+    distance_at: float
+    worst_stretch: float
+    volume: float | None
+    folds: int | None
+    crossings: int | None
+
+
 @dataclass
 class BakeReport:
     """Everything that a bake tells about itself.
@@ -97,6 +136,8 @@ class BakeReport:
         The most memory that the process has held, in megabytes; None where the system does not tell.
     collider_crossings
         For each frame, pairs of triangles of which one is a collider's, or None as above; None without colliders.
+    played
+        What a control plays between the frames; None where none was asked for.
     notes
         Sentences for the user.
     """
@@ -117,11 +158,25 @@ class BakeReport:
     seconds: dict[str, float]
     peak_memory_mb: float | None
     collider_crossings: list[int | None] | None = None
+    played: PlayedReport | None = None
     notes: list[str] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
         """The report as plain values that can be written as JSON."""
         return asdict(self)
+
+    def at(self, chosen: list[int]) -> BakeReport:
+        """The report of some of the frames, by their numbers."""
+        worst = self.worst_stretch
+        frame = chosen.index(worst.frame) if worst.frame in chosen else 0
+        return replace(
+            self,
+            folds=replace(self.folds, frames=_at(self.folds.frames, chosen)),
+            crossings=[self.crossings[index] for index in chosen],
+            certificates=[self.certificates[index] for index in chosen] if self.certificates else [],
+            collider_crossings=_at(self.collider_crossings, chosen),
+            worst_stretch=replace(worst, frame=frame),
+        )
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> BakeReport:
@@ -131,7 +186,12 @@ class BakeReport:
         parts["certificates"] = [Certificate(**one) for one in parts["certificates"]]
         parts["residual"] = None if parts["residual"] is None else Residual(**parts["residual"])
         parts["worst_stretch"] = WorstStretch(**parts["worst_stretch"])
+        parts["played"] = None if parts["played"] is None else PlayedReport(**parts["played"])
         return cls(**parts)
+
+
+def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
+    return None if counts is None else [counts[index] for index in chosen]
 
 
 def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str = "itself") -> list[str]:

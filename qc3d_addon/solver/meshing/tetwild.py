@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import zipfile
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import MeshingError, with_remedy
-from ..files.private_folders import PrivateFolder
+from ..files.private_folders import PrivateFolder, temporary_place
 from ..numerics.grouped_sums import means_by_label
 from ..support.guarded_program import Ending, Guardian
 from ..tets.mesh import TetMesh
@@ -124,7 +123,7 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
         raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
     except OSError as error:
         raise MeshingError(
-            f"The meshing engine tetwild cannot work with temporary files in {tempfile.gettempdir()}: "
+            f"The meshing engine tetwild cannot work with temporary files in {temporary_place()}: "
             f"{with_remedy(error)}."
         ) from error
 

@@ -54,7 +54,8 @@ def distinct(numbers: Ints) -> Ints:
     ordered = np.sort(numbers)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
-    return np.asarray(ordered[first])
+    kept: Ints = ordered[first]
+    return kept
 
 
 def among(numbers: Ints, known: Ints) -> Bools:

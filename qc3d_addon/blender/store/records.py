@@ -55,7 +55,7 @@ class Chain:
         First and last frame of the keyframes that a bake put on the slider, or None.
     request
         What the newest bake was asked for, as plain values; empty for those of older versions. Only
-        ``requests.BakeRequest.again`` looks into it.
+        ``BakeRequest.again`` looks into it.
     result
         What the panel shows of the newest bake, None for those of older versions.
     mirror_of
@@ -153,8 +153,8 @@ class Record:
                     raise ValueError("two chains with one slider, or through the same keys")
         except (ValueError, KeyError, TypeError) as error:
             raise DamagedRecordError(
-                f"The record of earlier bakes on '{owner}' is damaged; press Forget Damaged Record in the box of the "
-                "bakes, which keeps all shape keys and sliders, then bake anew."
+                f"The record of earlier bakes on '{owner}' is damaged; press Forget Damaged Record under Baked "
+                "In-Betweens, which keeps all shape keys and sliders, then bake anew."
             ) from error
         return cls(chains, maps)
 

@@ -101,6 +101,7 @@ def n_gon_prism() -> Keys:
 
 
 SEAM, SEAM_FACES = split_along_a_seam(FACES)
+ULPS = np.random.default_rng(3).integers(-1, 2, (2, len(SEAM), 3)) * np.spacing(np.float32(5.0)) / 2.0
 LOOSE = RANDOM.uniform(-2.0, 6.0, size=(15, 3))
 WIRE = np.linspace([0.0, 0.0, 5.0], [1.0, 0.0, 8.0], 6)
 WIRES = len(BAR) + np.column_stack([np.arange(5), np.arange(1, 6)])
@@ -124,6 +125,8 @@ KINDS: dict[str, Keys] = {
     "wires on faces and onto themselves": (BAR, BENT, FACES, np.concatenate([SIDES, SIDES[:, ::-1], [[0, 0], [3, 3]]])),
     "a seam": (BAR[SEAM], BENT[SEAM], SEAM_FACES),
     "a seam on the move": (BAR[SEAM], moved(BENT)[SEAM], SEAM_FACES),
+    "a rounded seam": (BAR[SEAM] + ULPS[0], BENT[SEAM] + ULPS[1], SEAM_FACES),
+    "a rounded seam on the move": (BAR[SEAM] + ULPS[0], moved(BENT)[SEAM] + ULPS[1], SEAM_FACES),
     "every triangle on its own": (BAR[FACES.ravel()], BENT[FACES.ravel()], np.arange(FACES.size).reshape(-1, 3)),
     "no area in the first key": (pinched(BAR, *FACES[5, :2]), BENT, FACES),
     "no area in the second key": (BAR, pinched(BENT, *FACES[40, :2]), FACES),
@@ -308,6 +311,17 @@ class TestSeams:
         volumes = [enclosed_volume(frame, SEAM_FACES) for frame in frames]
         expected = volumes[0] + np.array(TIMES) * (volumes[-1] - volumes[0])
         np.testing.assert_allclose(volumes, expected, rtol=1e-9)
+
+
+    @pytest.mark.parametrize("mode", MODES)
+    @pytest.mark.parametrize("kind", ["a rounded seam", "a rounded seam on the move"])
+    def test_sealed_up_to_the_rounding_of_the_keys(self, kind: str, mode: Mode) -> None:
+        bake = baked_once(kind, mode)
+        copies = [np.flatnonzero(vertex == SEAM) for vertex in np.unique(SEAM)]
+        gap = max(np.ptp(bake.frames[:, group], axis=1).max() for group in copies)
+        assert 0.0 < gap < 4.0 * np.ptp(ULPS) / 2.0
+        assert bake.report.welded == [len(SEAM) - len(BAR)]
+        assert any("no more than rounding" in note for note in bake.report.notes)
 
 
 def test_nested_components_keep_their_volumes_and_their_distance() -> None:

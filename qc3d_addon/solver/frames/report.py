@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+from ..keys.keypair import KeyPair
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,8 @@ class BakeReport:
         Options of the fit; None in mode ``straight``.
     vertices, tetrahedra
         How many the mesh has, and the volumes of all pairs together.
+    welded
+        For each pair, how many vertices were taken as one with others, with which they coincide in both keys.
     folds
         Of the fitted maps and of the frames' maps.
     crossings
@@ -107,6 +110,7 @@ class BakeReport:
     quality: str | None
     vertices: int
     tetrahedra: int
+    welded: list[int]
     folds: Folds
     crossings: list[int]
     certificates: list[Certificate]
@@ -131,6 +135,17 @@ class BakeReport:
         parts["residual"] = None if parts["residual"] is None else Residual(**parts["residual"])
         parts["worst_stretch"] = WorstStretch(**parts["worst_stretch"])
         return cls(**parts)
+
+
+def welding_notes(pairs: Sequence[KeyPair]) -> list[str]:
+    """A sentence about vertices that were taken as one with others although they do not coincide exactly."""
+    most = max(pair.nearly_coincident for pair in pairs)
+    if not most:
+        return []
+    return [
+        f"{most} {'vertex differs' if most == 1 else 'vertices differ'} from others by no more than rounding in both "
+        "keys and stay together with them, as at a seam."
+    ]
 
 
 def crossing_notes(crossings: Sequence[int], times: Floats, subject: str = "itself") -> list[str]:

@@ -25,7 +25,7 @@ class StraightFrames:
         # Crossings are counted in units that suit them.
         self._scale = 1.0 / max(float(np.ptp(key, axis=0).max()) for key in (pair.key0, pair.key1))
         self._still = (pair.key0 == pair.key1).all(axis=1)
-        self._limit = CrossingLimit(pair.faces, self._scaled(pair.key0), self._scaled(pair.key1), self._still)
+        self._limit = CrossingLimit(pair.welded_faces, self._scaled(pair.key0), self._scaled(pair.key1), self._still)
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..errors import InputError, naming_pair
-from ..triangles.topology import welded
+from ..triangles.topology import sides, welded
 
 # The names of the first and the second key of a pair.
 Ends = tuple[str, str]
@@ -22,6 +22,11 @@ Ends = tuple[str, str]
 # Cubes of what lies between, and squares of its areas, still are numbers.
 _SMALLEST, LARGEST = 1e-75, 1e75
 _MOST_GROWTH = 1e10
+# Copies of a vertex differ by this many steps of single precision at the largest coordinate, where several roundings
+# add up; but never by more than a part of the size, however far from the origin the mesh is.
+_SINGLE_STEP = float(np.finfo(np.float32).eps)
+_ROUNDING_STEPS = 8.0
+_MOST_ROUNDING = 3e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +79,26 @@ class KeyPair:
 
     @cached_property
     def welding(self) -> tuple[Ints, Ints]:
-        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,)."""
-        return welded(self.key0, self.key1)
+        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,).
+
+        Copies of a vertex may differ by a few steps of single precision, in which meshes are stored: at seams whose
+        sides were computed apart, or between objects that were joined.
+        """
+        reach = (_rounding(self.key0), _rounding(self.key1))
+        return welded(self.key0, self.key1, reach, np.concatenate([sides(self.faces), self.edges]))
+
+    @cached_property
+    def welded_faces(self) -> Ints:
+        """(m, 3) the triangles with one vertex of each group at their corners, so that they meet at seams."""
+        vertices, group = self.welding
+        return np.asarray(vertices[group[self.faces]])
+
+    @cached_property
+    def nearly_coincident(self) -> int:
+        """How many vertices are taken as one with another although rounding has moved them apart in a key."""
+        vertices, group = self.welding
+        apart = [(key != key[vertices][group]).any(axis=1) for key in (self.key0, self.key1)]
+        return int(np.count_nonzero(apart[0] | apart[1]))
 
 
 def consecutive_pairs(
@@ -151,6 +174,12 @@ def _require_like_sizes(first: Floats, second: Floats) -> None:
             f"The second key is {ratio:.0e} times as large as the first, more than numbers can hold; "
             "bring both keys to like sizes."
         )
+
+
+def _rounding(key: Floats) -> float:
+    """How far apart copies of a vertex may be along an axis."""
+    steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
+    return min(steps, _MOST_ROUNDING * float(np.ptp(key, axis=0).max(initial=0.0)))
 
 
 def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:

@@ -74,6 +74,9 @@ class SurfacePath:
         self._law: StretchLaw = law
         self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
+        self._apart = None
+        if embedding.pair.nearly_coincident:
+            self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
         self._travel = key1 - self._key0
         still = embedding.still[self.vertices]
         count = len(self.vertices)
@@ -167,7 +170,14 @@ class SurfacePath:
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
         """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
         settled = Sweeps(self._surface, [self._wanted(*moment) for moment in moments]).settled(sweeps)
-        return [shape[self._group] for shape in settled]
+        return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
+
+    def _unwelded(self, shape: Floats, time: float) -> Floats:
+        """Positions (n, 3) of all vertices: copies are as far from the one of their group as in the keys."""
+        positions = shape[self._group]
+        if self._apart is not None:
+            positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
+        return positions
 
     def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]

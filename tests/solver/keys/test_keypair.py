@@ -37,6 +37,28 @@ class TestKeyPair:
         key0 = np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 12]])
         assert KeyPair.checked(key0, 2.0 * key0, np.empty((0, 3))).diagonal == 13.0
 
+    @pytest.mark.parametrize("place", [0.0, 30.0, 3000.0])
+    @pytest.mark.parametrize("steps", [0, 1, 3])
+    def test_seams_are_found_up_to_a_few_steps_of_single_precision(self, steps: int, place: float) -> None:
+        # The sphere as single triangles, whose corners were rounded one by one.
+        random = np.random.default_rng(1)
+        keys = []
+        for key in (POINTS + place, 3.0 * POINTS):
+            loose = key[FACES.ravel()].astype(np.float32)
+            keys.append(loose + random.integers(-steps, steps + 1, loose.shape) * np.spacing(loose))
+        pair = KeyPair.checked(*keys, np.arange(FACES.size).reshape(-1, 3))
+        vertices, group = pair.welding
+        assert len(vertices) == len(POINTS)
+        np.testing.assert_array_equal(group[vertices], np.arange(len(vertices)))
+        assert (pair.nearly_coincident > 0) == (steps > 0)
+        assert len(np.unique(pair.welded_faces)) == len(POINTS)
+
+    def test_neighbours_stay_apart_however_small_the_mesh_is_beside_its_place(self) -> None:
+        far = np.array([3e4, -1e4, 2e4]) + POINTS
+        pair = KeyPair.checked(far, far + 0.01 * POINTS, FACES)
+        assert len(pair.welding[0]) == len(POINTS)
+        assert pair.nearly_coincident == 0
+
     def test_without_edges_and_faces(self) -> None:
         pair = KeyPair.checked(POINTS, POINTS, np.empty((0, 3)))
         assert pair.faces.shape == (0, 3)

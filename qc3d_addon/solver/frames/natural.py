@@ -28,7 +28,7 @@ _UNCROSSING_ATTEMPTS = 3
 # How often the surface is solved again around what colliders push.
 _PUSHES = 4
 # How many times as strongly the surface is drawn to the volume's anchors at a crossing.
-_STRONGEST_ANCHOR = 1e5
+_STRONGEST_ANCHOR = 1e8
 
 
 class NaturalFrames:

@@ -22,8 +22,8 @@ class StraightFrames:
 
     def __init__(self, pair: KeyPair) -> None:
         self._pair = pair
-        # Crossings are counted in units that suit them.
-        self._scale = 1.0 / max(float(np.ptp(key, axis=0).max()) for key in (pair.key0, pair.key1))
+        # Crossings are counted in units that suit them; powers of two lose nothing, however large or small the keys.
+        self._exponent = int(np.frexp(max(float(np.ptp(key / 2.0, axis=0).max()) for key in (pair.key0, pair.key1)))[1])
         self._still = (pair.key0 == pair.key1).all(axis=1)
         self._limit = CrossingLimit(pair.welded_faces, self._scaled(pair.key0), self._scaled(pair.key1), self._still)
 
@@ -33,11 +33,18 @@ class StraightFrames:
         pair = self._pair
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
-            positions = pair.key1 if time == 1.0 else pair.key0 + time * (pair.key1 - pair.key0)
+            positions = pair.key1 if time == 1.0 else _blended(pair.key0, pair.key1, time)
             if resolver is not None:
                 positions = resolver.cleared(index, positions, time, self._still)
             made.append(Frame(positions, self._limit.excess(self._scaled(positions))))
         return made
 
     def _scaled(self, positions: Floats) -> Floats:
-        return np.asarray((positions - self._pair.key0[0]) * self._scale)
+        scaled = np.ldexp(positions, -self._exponent)
+        return np.asarray(scaled - np.ldexp(self._pair.key0[0], -self._exponent))
+
+
+def _blended(key0: Floats, key1: Floats, time: float) -> Floats:
+    """(n, 3) positions on the straight lines; what is alike in both keys stays bit for bit, and nothing overflows."""
+    half = time * (key1 / 2.0 - key0 / 2.0)
+    return np.asarray(key0 + half + half)

@@ -34,7 +34,7 @@ from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
 from .tangents import tangents_of
 
-ANCHOR_WEIGHT = 0.05
+ANCHOR_WEIGHT = 5e-5
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -98,9 +98,9 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
-        size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
-        area = float(self.deformation.weights.sum()) or size**2
-        self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        area = float(self.deformation.weights.sum())
+        density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
+        self._anchor_weights = ANCHOR_WEIGHT * density * weights
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
             usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights

@@ -53,7 +53,7 @@ def _joined_groups(both: Floats, reach: tuple[float, float], edges: Ints | None)
     count = len(both)
     # In a key that is squashed into a point everything would be near everything.
     sizes = np.ptp(both, axis=0).reshape(2, 3).max(axis=1)
-    key = int(reach[1] * sizes[0] < reach[0] * sizes[1])
+    key = int(np.argmin(np.divide(reach, sizes, out=np.full(2, np.inf), where=sizes > 0.0)))
     near = cKDTree(both[:, 3 * key : 3 * key + 3]).query_pairs(reach[key], p=np.inf, output_type="ndarray")
     apart = np.abs(both[near[:, 0]] - both[near[:, 1]])
     near = near[(apart <= np.repeat(reach, 3)).all(axis=1)]

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from qc3d_addon.solver.numerics.assembly import StiffnessPattern, stiffness_elements
-from qc3d_addon.solver.numerics.nested_dissection import dissection_order
+from qc3d_addon.solver.numerics.nested_dissection import elimination_order
 from qc3d_addon.solver.triangles.geometry import hat_gradients, tangent_bases
 
 from .catalogue import Floats, Ints
@@ -37,7 +37,7 @@ def cuthill_mckee(points: Floats, matrix: csr_array) -> Ints:
 # By name: how the order is found, and what SuperLU itself orders by.
 Spec = Literal["NATURAL", "MMD_AT_PLUS_A", "COLAMD"]
 ORDERS: tuple[tuple[str, Callable[[Floats, csr_array], Ints] | None, Spec], ...] = (
-    ("nested dissection", dissection_order, "NATURAL"),
+    ("nested dissection", elimination_order, "NATURAL"),
     ("MMD_AT_PLUS_A", None, "MMD_AT_PLUS_A"),
     ("COLAMD", None, "COLAMD"),
     ("reverse Cuthill-McKee", cuthill_mckee, "NATURAL"),

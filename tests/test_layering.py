@@ -28,7 +28,7 @@ SOLVER_FLOORS = (
 )
 ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))
 BLENDER_FLOORS = (
-    ("compat", "preferences"),
+    ("compat", "native_files", "preferences"),
     ("store",),
     ("keys",),
     ("heat_map",),

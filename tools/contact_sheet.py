@@ -16,12 +16,22 @@ from pathlib import Path
 
 import numpy as np
 
+from qc3d_addon.solver.errors import InputError, QC3DError
+from qc3d_addon.solver.files.atomic import replacing, require_writable
+from qc3d_addon.solver.files.npz import open_archive, read_array, require_file
 from qc3d_paper.drawing.shading import VIEWS, Floats, Ints
 from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Read the rows and write the picture."""
+    """Read the rows and write the picture; SystemExit with one sentence where that cannot be done."""
+    try:
+        _draw(_arguments(argv))
+    except QC3DError as error:
+        raise SystemExit(f"contact_sheet: {error}") from error
+
+
+def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("rows", nargs="+", metavar="[LABEL=]FILE", help="a baked .blend, or an .npz of frames")
     parser.add_argument("--object", help="in a .blend: the object")
@@ -35,8 +45,13 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
     parser.add_argument("--height", type=int, default=220, metavar="PIXELS", help="of one row (default: 220)")
     parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png")
-    arguments = parser.parse_args(argv)
+    return parser.parse_args(argv)
 
+
+def _draw(arguments: argparse.Namespace) -> None:
+    if arguments.output.suffix != ".png":
+        raise InputError(f"{arguments.output} is no picture that can be drawn; give a name that ends in .png.")
+    require_writable(arguments.output, inputs=[_path(row) for row in arguments.rows])
     rows = [_read(row, arguments) for row in arguments.rows]
     rows = [row._replace(times=row.times[:: arguments.every], frames=row.frames[:: arguments.every]) for row in rows]
     if arguments.straight:
@@ -46,19 +61,28 @@ def main(argv: list[str] | None = None) -> None:
         rows = [row.with_scenery(*scenery) for row in rows]
     if arguments.up == "y":
         rows = [row._replace(frames=row.frames[..., [0, 2, 1]] * (1.0, -1.0, 1.0)) for row in rows]
-    save_sheet(rows, arguments.view, arguments.height, arguments.output)
+    with replacing(arguments.output) as unfinished:
+        save_sheet(rows, arguments.view, arguments.height, unfinished)
+
+
+def _path(row: str) -> Path:
+    return Path(row.rpartition("=")[2])
 
 
 def _read(text: str, arguments: argparse.Namespace) -> Row:
-    label, _, name = text.rpartition("=")
-    path = Path(name)
+    label, path = text.rpartition("=")[0], _path(text)
     if path.suffix == ".blend":
         if None in (arguments.object, arguments.first, arguments.last):
-            raise SystemExit("A .blend needs --object, --from and --to.")
+            raise InputError("A .blend needs --object, --from and --to.")
         through = (arguments.first, *arguments.via, arguments.last)
         return _read_blend(label or path.stem, path, arguments.object, through)
-    with np.load(path, allow_pickle=False) as stored:
-        return Row(label or path.stem, stored["faces"].astype(np.int64), stored["times"], stored["frames"])
+    with open_archive(path, "faces, times and frames are needed") as stored:
+        faces, times, frames = (read_array(stored, name, path) for name in ("faces", "times", "frames"))
+    numbers = all(array.dtype.kind in "fiu" for array in (faces, times, frames))
+    fits = faces.ndim == 2 and faces.shape[1:] == (3,) and frames.ndim == 3 and frames.shape[2:] == (3,)
+    if not (numbers and fits and len(frames) and times.shape == (len(frames),)):
+        raise InputError(f"The arrays in {path} are no frames; name what qc3d interpolate wrote.")
+    return Row(label or path.stem, faces.astype(np.int64), times.astype(np.float64), frames.astype(np.float64))
 
 
 def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> Row:
@@ -68,11 +92,16 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
     from qc3d_addon.blender.store.records import Record
 
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects[name]
-    chain = Record.read(obj.data.shape_keys).chain(through)
+    require_file(path)
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), use_scripts=False)
+    except RuntimeError as error:
+        raise InputError(f"{path} cannot be opened; it must be a .blend file this Blender can read.") from error
+    obj = bpy.data.objects.get(name)
+    keys = getattr(obj and obj.data, "shape_keys", None)
+    chain = None if keys is None else Record.read(keys).chain(through)
     if chain is None:
-        raise SystemExit(f"{path} has no in-betweens of {' → '.join(through)}.")
+        raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
     stride = chain.intervals // (len(through) - 1)
     keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
     steps = sorted(keys)
@@ -87,7 +116,7 @@ def _read_scenery(name: str) -> tuple[Floats, Ints]:
     from qc3d_addon.blender.store.mesh_data import triangles
 
     if name not in bpy.data.objects:
-        raise SystemExit(f"There is no object {name!r}.")
+        raise InputError(f"There is no object {name!r}.")
     obj = bpy.data.objects[name]
     points = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
     return points, triangles(obj.data).astype(np.int64)

@@ -4,21 +4,22 @@
 
 from __future__ import annotations
 
-import sys
-
 from .compat import interruptible
 
 
 def run_command(arguments: list[str]) -> int:
     """Run one command line; the exit status."""
     # Imported when the command runs: Blender registers it each time it starts.
+    from ..cli import speech
+
+    speech.open_streams()
     with interruptible():
         try:
             from ..cli.main import main
 
             return main(arguments)
         except KeyboardInterrupt:  # while the libraries were loaded
-            print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
+            speech.note("Interrupted; nothing was written.")
             return 130
         except SystemExit as ended:  # --help and --version end this way, which Blender would report as an error
             return int(ended.code or 0)

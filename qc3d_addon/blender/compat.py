@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import bpy
 
@@ -34,6 +34,12 @@ def unregister_command(handle: object) -> None:
     bpy.utils.unregister_cli_command(handle)
 
 
+def remove_handler(handlers: list[Callable[..., object]], handler: Callable[..., object]) -> None:
+    """Take a handler back, where it is still there: some scripts and add-ons remove those of others with their own."""
+    if handler in handlers:
+        handlers.remove(handler)
+
+
 def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     """Add a driver whose value reaches the property unchanged.
 
@@ -46,6 +52,16 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     while curve.keyframe_points:
         curve.keyframe_points.remove(curve.keyframe_points[0])
     return curve
+
+
+def clear_shape_keys(obj: bpy.types.Object) -> None:
+    """Remove all shape keys of an object's mesh.
+
+    Up to 4.5 Blender leaves their data block behind, without a mesh: who then reads a point of it crashes.
+    """
+    number = obj.data.shape_keys.session_uid
+    obj.shape_key_clear()
+    bpy.data.batch_remove([keys for keys in bpy.data.shape_keys if keys.session_uid == number])
 
 
 def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
@@ -80,14 +96,34 @@ def _fcurves(owner: bpy.types.ID) -> bpy.types.bpy_prop_collection | None:
     return None if channels is None else channels.fcurves
 
 
-def ensure_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
-    """The F-curve of a property, with the action (and slot) made where there is none."""
+def ensure_fcurve(owner: bpy.types.ID, data_path: str, undo: ExitStack) -> bpy.types.FCurve:
+    """The F-curve of a property, with the action (and slot) made where there is none.
+
+    Closing ``undo`` takes back what was made.
+    """
     curve = find_fcurve(owner, data_path)
     if curve is not None:
         return curve
-    animation = owner.animation_data_create()
+    if owner.animation_data is None:
+        owner.animation_data_create()
+        undo.callback(owner.animation_data_clear)
+    animation = owner.animation_data
     if animation.action is None:
         animation.action = bpy.data.actions.new(f"{owner.name}Action")
+        undo.callback(bpy.data.actions.remove, animation.action)
     if hasattr(animation, "action_slot"):
-        return animation.action.fcurve_ensure_for_datablock(owner, data_path)
-    return animation.action.fcurves.new(data_path)
+        undo.callback(_take_back_slots, owner, animation.action_slot, set(animation.action.slots))
+        curve = animation.action.fcurve_ensure_for_datablock(owner, data_path)
+    else:
+        curve = animation.action.fcurves.new(data_path)
+    undo.callback(lambda: _fcurves(owner).remove(find_fcurve(owner, data_path)))
+    return curve
+
+
+def _take_back_slots(
+    owner: bpy.types.ID, chosen: bpy.types.ActionSlot | None, before: set[bpy.types.ActionSlot]
+) -> None:
+    animation = owner.animation_data
+    for slot in [slot for slot in animation.action.slots if slot not in before]:
+        animation.action.slots.remove(slot)
+    animation.action_slot = chosen

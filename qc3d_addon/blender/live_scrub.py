@@ -10,7 +10,7 @@ after. Its name is reserved: a key of that name is taken away wherever it turns 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import bmesh
@@ -18,13 +18,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
-from .keys import shape_keys
+from . import compat
+from .keys import shape_keys, slider
 from .store.mesh_data import key_coordinates, set_key_coordinates
+from .store.records import Chain, Record
 
 if TYPE_CHECKING:
     from ..solver.frames.preview import PreviewCurve
     from .bake.plan import Plan
-    from .store.records import Chain
 
 KEY = "QC3D Preview"
 
@@ -44,10 +45,10 @@ _scrub: _Scrub | None = None
 _suspended: _Scrub | None = None  # while the file is saved
 
 
-def is_on(obj: bpy.types.Object | None, slider: str = "") -> bool:
+def is_on(obj: bpy.types.Object | None, slider_name: str = "") -> bool:
     """Whether the preview is on for an object, and for that slider where one is named."""
     on_object = _scrub is not None and obj is not None and _scrub.plan.object_id == obj.session_uid
-    return on_object and (not slider or _scrub.chain.slider == slider)  # type: ignore[union-attr]
+    return on_object and (not slider_name or _scrub.chain.slider == slider_name)  # type: ignore[union-attr]
 
 
 def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
@@ -56,9 +57,11 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
     Raises
     ------
     InputError
-        If the object of the plan is gone or was changed meanwhile; it is as it was.
+        If the object of the plan is gone or was changed meanwhile, or the slider is not a number; it is as it was.
     """
     obj = plan.find_object()
+    slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
+    shape_keys.restart_drivers(obj.data.shape_keys, chain)
     end()
     _show(obj, _Scrub(plan, chain, curve))
 
@@ -76,17 +79,24 @@ def end() -> None:
 def _show_again(scrub: _Scrub) -> None:
     """Show it where the object is there, is not being edited, and has the keys that the curve was made from."""
     with contextlib.suppress(InputError):
-        _show(scrub.plan.find_object(), scrub)
+        obj = scrub.plan.find_object()
+        chain = Record.read(obj.data.shape_keys).chain_of_slider(scrub.chain.slider)
+        if chain is not None:  # undo may have brought back another number of steps
+            _show(obj, replace(scrub, chain=chain))
 
 
 def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
     global _scrub
-    key = obj.shape_key_add(name=KEY, from_mix=False)
-    key.relative_key = obj.data.shape_keys.reference_key
-    key.value = 1.0
-    scrub.place = None
-    _scrub = scrub
-    _follow(scrub)
+    try:
+        key = obj.shape_key_add(name=KEY, from_mix=False)
+        key.relative_key = obj.data.shape_keys.reference_key
+        key.value = 1.0
+        scrub.place = None
+        _scrub = scrub
+        _follow(scrub)
+    except BaseException:
+        end()
+        raise
 
 
 def _follow(scrub: _Scrub) -> None:
@@ -101,8 +111,9 @@ def _follow(scrub: _Scrub) -> None:
         scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
         return
     owner = shape_keys.slider_owner(obj, scrub.chain)
-    is_whole = scrub.chain.slider in owner and len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
-    if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole:
+    is_whole = len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
+    is_playable = slider.problem(owner, scrub.chain.slider) is None
+    if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or not is_playable:
         end()
         return
     place = float(owner[scrub.chain.slider])
@@ -209,5 +220,5 @@ def register() -> None:
 def unregister() -> None:
     """Take the preview away and follow nothing."""
     for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+        compat.remove_handler(getattr(bpy.app.handlers, name), handler)
     end()

@@ -19,6 +19,7 @@ from .operators.chains import (
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
+from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.live_scrub import QC3D_OT_live_scrub
@@ -44,6 +45,7 @@ CLASSES = (
     QC3D_OT_export_alembic,
     QC3D_OT_save_map,
     QC3D_OT_load_map,
+    QC3D_OT_forget_record,
     QC3D_OT_add_inner_key,
     QC3D_OT_remove_inner_key,
     presets.QC3D_MT_presets,

@@ -5,27 +5,23 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from ..solver.errors import InputError
-from ..solver.files.npz import replacing_all
+from ..solver.files.atomic import making_folder, replacing_all, require_writable_in
+from ..solver.files.npz import write_arrays
 from ..solver.fit.fit_pair import fit_pair
 from ..solver.frames.measures import VertexMeasures
 from ..solver.keys.files import read_pair
 from ..solver.maps.analysis import Analysis
-from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
+from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, put_tets, read_tets
 from ..solver.maps.mapping import Mapping
 from ..solver.settings import FitOptions
 from ..solver.support.progress import finish
-from .options import add_options, fit_options
+from .options import add_options, fit_options, write_json
 from .progress_bars import StageBars
 
 if TYPE_CHECKING:
@@ -55,11 +51,15 @@ def _run(arguments: argparse.Namespace) -> None:
     if find_spec("matplotlib") is None:
         raise InputError("The pictures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
     fitted = None
+    names = [f"mapping.{arguments.format}", "histograms.png", "slices.png", "summary.json"]
     if (arguments.first is None) != (arguments.last is None):
         raise InputError("Two shapes are needed; give both --from and --to, or neither for a mesh of tetrahedra.")
     if arguments.first is not None:
         if arguments.target is not None:
             raise InputError("--target belongs to meshes of tetrahedra; leave it out, or --from and --to.")
+        names += ["surface.npz", "surface.png"]
+    require_writable_in(arguments.output, names, [arguments.input, arguments.target])
+    if arguments.first is not None:
         pair = read_pair(arguments.input, arguments.first, arguments.last)
         with StageBars() as bars:
             fitted = finish(fit_pair(pair, fit_options(arguments)), bars)
@@ -67,54 +67,30 @@ def _run(arguments: argparse.Namespace) -> None:
     else:
         mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
     analysis = Analysis(mapping)
-    with _folder(arguments.output):
-        _write(analysis, fitted, arguments.output, arguments.format)
+    with making_folder(arguments.output):
+        _write(analysis, fitted, [arguments.output / name for name in names])
 
 
-@contextmanager
-def _folder(path: Path) -> Iterator[None]:
-    """Make a folder where there is none; leaving by an error removes it again."""
-    is_new = not path.exists()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path} cannot be made a folder: {error.strerror or error}.") from error
-    try:
-        yield
-    except BaseException:
-        if is_new:
-            with suppress(OSError):
-                path.rmdir()
-        raise
-
-
-def _write(analysis: Analysis, fitted: FittedMap | None, folder: Path, ending: str) -> None:
+def _write(analysis: Analysis, fitted: FittedMap | None, paths: list[Path]) -> None:
     from qc3d_paper.drawing.slices import save_histograms, save_slices
     from qc3d_paper.drawing.surfaces import save_distortion
 
     summary = analysis.summary()
-    names = [f"mapping.{ending}", "histograms.png", "slices.png", "summary.json"]
-    names += [] if fitted is None else ["surface.npz", "surface.png"]
-    with replacing_all(*(folder / name for name in names)) as (mapping, histograms, slices, text, *surface):
-        write_tets(mapping, _with_attributes(analysis))
-        try:
-            save_histograms(analysis, histograms)
-            save_slices(analysis, slices)
-            if fitted is not None:
-                pair = fitted.pair
-                measures = VertexMeasures([fitted]).of(0, pair.key1, fitted.mapped)
-                summary["surface"] = {
-                    "vertices": len(pair.key0),
-                    "landmark_residual": asdict(fitted.landmark_residual()),
-                    **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
-                }
-                arrays: dict[str, Any] = dict(measures)
-                with surface[0].open("wb") as file:
-                    np.savez_compressed(file, faces=pair.faces, key0=pair.key0, key1=pair.key1, **arrays)
-                save_distortion(pair, measures, surface[1])
-            text.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{folder} cannot be written to: {error.strerror or error}; nothing was.") from error
+    with replacing_all(*paths) as (mapping, histograms, slices, text, *surface):
+        put_tets(mapping, _with_attributes(analysis), paths[0])
+        save_histograms(analysis, histograms)
+        save_slices(analysis, slices)
+        if fitted is not None:
+            pair = fitted.pair
+            measures = VertexMeasures([fitted]).of(0, pair.key1, fitted.mapped)
+            summary["surface"] = {
+                "vertices": len(pair.key0),
+                "landmark_residual": asdict(fitted.landmark_residual()),
+                **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
+            }
+            write_arrays(surface[0], {"faces": pair.faces, "key0": pair.key0, "key1": pair.key1, **measures})
+            save_distortion(pair, measures, surface[1])
+        write_json(text, summary)
 
 
 def _with_attributes(analysis: Analysis) -> TetFile:

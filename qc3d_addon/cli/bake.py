@@ -16,7 +16,6 @@ from .options import (
     frame_options,
     key_names,
     print_notes,
-    require_distinct_files,
     whole_number,
 )
 from .progress_bars import StageBars
@@ -48,8 +47,6 @@ def _run(arguments: argparse.Namespace) -> None:
         from ..blender.bake.run import bake_file
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
-    require_distinct_files(arguments.file, arguments.report)
-    require_distinct_files(arguments.output, arguments.report)
     request = BakeRequest(
         key_names(arguments),
         arguments.frames,

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -14,16 +13,18 @@ import numpy as np
 from ..solver.arrays import Floats, Ints
 from ..solver.compression import frames as frame_compression
 from ..solver.compression.codec import Boundary, Codec, Scheme
-from ..solver.compression.files import Packer, Source, read_compressed, write_compressed
+from ..solver.compression.files import Packer, Source, read_compressed
 from ..solver.compression.search import Choice, Compressor
 from ..solver.compression.transfer_loss import transferred
 from ..solver.errors import InputError
-from ..solver.files.npz import open_archive, read_array, replacing, replacing_all
+from ..solver.files.atomic import replacing, replacing_all, require_writable
+from ..solver.files.npz import open_archive, read_array, write_arrays
 from ..solver.keys.keypair import KeyPair
 from ..solver.maps.boundary_conditions import Conditions
 from ..solver.maps.files import TARGET, TetFile, read_tets, write_tets
 from ..solver.maps.mapping import Mapping
-from .options import whole_number
+from . import speech
+from .options import output_files, whole_number, write_json
 
 _MODES = 300
 
@@ -67,19 +68,17 @@ class _Job(NamedTuple):
 def _compress(arguments: argparse.Namespace) -> None:
     if arguments.error is not None and not 0.0 < arguments.error < np.inf:
         raise InputError(f"The error {arguments.error} is not possible; give a number above 0.")
-    if arguments.report is not None and arguments.report.resolve() == arguments.output.resolve():
-        raise InputError(f"{arguments.report} is named twice; output and report must be different files.")
-    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
-    # Whether the places can be written is known before the work.
+    files = output_files(arguments)
+    require_writable(*files, inputs=[arguments.map, arguments.target])
+    job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
+    choice = _chosen(job.compressor, arguments)
+    data = job.packer.bytes_of(choice.compressed)
+    report = _report(job.compressor, choice, len(data))
     with replacing_all(*files) as (output, *report_files):
-        job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
-        choice = _chosen(job.compressor, arguments)
-        data = job.packer.bytes_of(choice.compressed)
-        report = _report(job.compressor, choice, len(data))
-        write_compressed(output, data)
+        output.write_bytes(data)
         for report_file in report_files:
-            report_file.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    print(
+            write_json(report_file, report)
+    speech.say(
         f"{len(data)} bytes, 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
         f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {choice.error:.2g}, folds "
         f"{sum(choice.folds)}"
@@ -95,16 +94,13 @@ def _chosen(compressor: Compressor, arguments: argparse.Namespace) -> Choice:
 
 
 def _decompress(arguments: argparse.Namespace) -> None:
+    require_writable(arguments.output, inputs=[arguments.file, arguments.mesh])
     if _holds(arguments.mesh, "key0"):
         first, faces = _first_frame(arguments.mesh)
         source = frame_compression.source_of(first, faces)
         frames = frame_compression.restored(first, read_compressed(arguments.file, source))
         with replacing(arguments.output) as unfinished:
-            try:
-                with unfinished.open("wb") as file:
-                    np.savez_compressed(file, faces=faces, frames=frames, key0=first, key1=frames[-1])
-            except OSError as error:
-                raise InputError(f"{arguments.output} cannot be written: {error.strerror or error}.") from error
+            write_arrays(unfinished, {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]})
         return
     content = read_tets(arguments.mesh)
     mesh = content.mesh()

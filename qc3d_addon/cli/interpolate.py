@@ -7,8 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..solver.errors import InputError
-from ..solver.files.npz import replacing_all
+from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.frames.bake import evenly_spaced
 from ..solver.frames.files import write_frames
 from ..solver.frames.task import Task, carry_out
@@ -22,8 +21,8 @@ from .options import (
     fit_options,
     frame_options,
     key_names,
+    output_files,
     print_notes,
-    require_distinct_files,
     write_json,
 )
 from .progress_bars import StageBars
@@ -41,21 +40,18 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    require_distinct_files(arguments.pair, arguments.output, arguments.report)
+    files = output_files(arguments)
+    require_writable(*files, inputs=[arguments.pair])
     names = key_names(arguments)
     pairs = read_pairs(arguments.pair, names)
     times = evenly_spaced((arguments.frames + 1) * (len(names) - 1) - 1)
     task = Task(pairs, names, fit_options(arguments), frame_options(arguments), times)
     task.require_memory(machine_limit_mb())
-    files = [arguments.output, *([] if arguments.report is None else [arguments.report])]
+    with StageBars() as bars:
+        bake = finish(carry_out(task), bars).bake
+    assert bake is not None
     with replacing_all(*files) as (output, *reports):
-        with StageBars() as bars:
-            bake = finish(carry_out(task), bars).bake
-        assert bake is not None
-        try:
-            write_frames(output, list(pairs.values()), bake.times, bake.frames)
-            for report in reports:
-                write_json(report, bake.report.as_json())
-        except OSError as error:
-            raise InputError(f"The results cannot be written: {error.strerror or error}.") from error
+        write_frames(output, list(pairs.values()), bake.times, bake.frames)
+        for report in reports:
+            write_json(report, bake.report.as_json())
     print_notes(bake.report.notes)

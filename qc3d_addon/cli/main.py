@@ -5,15 +5,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import tomllib
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
 
-from ..solver.errors import InputError, QC3DError
-from . import analyze, bake, compress, interpolate, reconstruct, reproduce
+from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
+from . import analyze, bake, compress, interpolate, reconstruct, reproduce, speech
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,20 +20,36 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns
     -------
-    0 when it is done; 2 when the input is not usable, with one sentence on standard error; 130 when interrupted.
+    0 when it is done; 1 when all files are written, but not what was to be said on standard output; 2 when it cannot be
+    done, with one sentence on standard error; 130 when interrupted.
     """
+    problem = None
     try:
         arguments = _parser().parse_args(argv)
         arguments.run(arguments)
     except QC3DError as error:
-        print(f"qc3d: {error}", file=sys.stderr)
-        return 2
+        problem = str(error)
     except MemoryError:
-        print("qc3d: There is not enough memory; use fewer frames, a lower quality or a smaller mesh.", file=sys.stderr)
-        return 2
+        problem = "There is not enough memory; use fewer frames, a lower quality or a smaller mesh."
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        problem = on_one_line(f"The system refuses to go on: {with_remedy(error)}{where}.")
+    except RuntimeError as error:
+        if "start new thread" not in str(error):
+            raise
+        problem = "The system allows no more threads; close some programs, or raise the limit (ulimit -u)."
     except KeyboardInterrupt:
-        print("qc3d: Interrupted; nothing was written.", file=sys.stderr)
+        speech.note("Interrupted; nothing was written.")
         return 130
+    finally:
+        speech.flush()  # the texts of --help and --version too
+    unheard = speech.take_unheard()
+    if problem is not None:
+        speech.note(problem)
+        return 2
+    if unheard is not None:
+        speech.note(f"Standard output cannot be written: {reason(unheard)}; all files are complete.")
+        return 1
     return 0
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from ..solver.errors import InputError, on_one_line
+from ..solver.errors import on_one_line
 from ..solver.settings import FitOptions, FrameOptions
+from . import speech
 
 MOST_FRAMES = 10_000
 _HELP = {
@@ -76,18 +76,15 @@ def key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
     return (arguments.first, *arguments.via, arguments.last)
 
 
-def require_distinct_files(*paths: Path | None) -> None:
-    """Raise InputError where two of the paths are one file."""
-    seen: dict[Path, Path] = {}
-    for path in paths:
-        if path is not None and seen.setdefault(path.resolve(), path) is not path:
-            raise InputError(f"{path} is named twice; input, output and report must be different files.")
+def output_files(arguments: argparse.Namespace) -> list[Path]:
+    """The output, and the report where one is asked for."""
+    return [arguments.output, *([] if arguments.report is None else [arguments.report])]
 
 
 def print_notes(notes: Iterable[str]) -> None:
     """Print sentences for the user on standard error."""
     for note in notes:
-        print(f"qc3d: {on_one_line(note)}", file=sys.stderr)
+        speech.note(on_one_line(note))
 
 
 def write_json(path: Path, values: dict[str, Any]) -> None:

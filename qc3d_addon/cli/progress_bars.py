@@ -26,7 +26,7 @@ class StageBars:
 
     def __init__(self) -> None:
         self._bar: tqdm[NoReturn] | None = None
-        self._visible = sys.stderr.isatty() and find_spec("tqdm") is not None
+        self._visible = sys.stderr is not None and sys.stderr.isatty() and find_spec("tqdm") is not None
 
     def __call__(self, progress: Progress) -> None:
         if not self._visible:

@@ -6,18 +6,19 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..solver.errors import InputError
+from ..solver.files.atomic import require_writable
 from ..solver.files.npz import require_file, unreadable
 from ..solver.maps.boundary_conditions import Conditions
 from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
 from ..solver.maps.reconstruction import reconstruct
 from ..solver.maps.representation import from_eigen_form, from_upper_triangle
+from . import speech
 
 if TYPE_CHECKING:
     from ..solver.arrays import Floats
@@ -59,6 +60,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    require_writable(arguments.output, inputs=[arguments.mesh, arguments.landmarks])
     content = read_tets(arguments.mesh)
     mesh = content.mesh()
     conditions = _conditions(arguments, content, mesh)
@@ -68,10 +70,9 @@ def _run(arguments: argparse.Namespace) -> None:
         TetFile(mesh.points, mesh.tets, {**content.at_vertices, TARGET: found.values}, content.at_tets),
     )
     if found.folds:
-        print(
-            f"qc3d: {found.folds} of {len(mesh.tets)} tetrahedra are folded: no map has this representation and meets "
-            "these conditions; give fewer or other ones.",
-            file=sys.stderr,
+        speech.note(
+            f"{found.folds} of {len(mesh.tets)} tetrahedra are folded: no map has this representation and meets "
+            "these conditions; give fewer or other ones."
         )
 
 

@@ -7,12 +7,14 @@ from __future__ import annotations
 import argparse
 from functools import cache
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from ..solver.errors import InputError
-from ..solver.files.npz import replacing
+from ..solver.files.atomic import making_folder, replacing, require_writable_in
 from ..solver.maps.mapping import Mapping
+from . import speech
 
 if TYPE_CHECKING:
     from qc3d_paper.experiments.caption import Caption
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from ..solver.tets.mesh import TetMesh
 
 NUMBERS = tuple(range(3, 14))
+_TEXT = "figures.md"
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,32 +42,31 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def _run(arguments: argparse.Namespace) -> None:
     if find_spec("matplotlib") is None:
         raise InputError("The figures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
-    try:
-        arguments.output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{arguments.output} cannot be made a folder: {error.strerror or error}.") from error
+    pictures = {number: arguments.output / f"figure{number}.png" for number in sorted(set(arguments.figure or NUMBERS))}
+    require_writable_in(arguments.output, [*(path.name for path in pictures.values()), _TEXT])
     texts = []
-    for number in sorted(set(arguments.figure or NUMBERS)):
-        picture = arguments.output / f"figure{number}.png"
-        with replacing(picture) as unfinished:
-            caption = _draw(number, arguments.data, unfinished)
-        texts.append(caption.text(picture))
-        print(f"Figure {number}: {caption.holds}")
-    with replacing(arguments.output / "figures.md") as unfinished:
+    for number, path in pictures.items():
+        drawn = BytesIO()
+        caption = _draw(number, arguments.data, drawn)
+        with making_folder(arguments.output), replacing(path) as unfinished:
+            unfinished.write_bytes(drawn.getvalue())
+        texts.append(caption.text(path))
+        speech.say(f"Figure {number}: {caption.holds}")
+    with replacing(arguments.output / _TEXT) as unfinished:
         unfinished.write_text("# The paper's figures, made again\n\n" + "\n".join(texts), encoding="utf-8")
 
 
-def _draw(number: int, data: Path | None, path: Path) -> Caption:
+def _draw(number: int, data: Path | None, file: BinaryIO) -> Caption:
     from qc3d_paper.experiments import bijections, sequences, shapes, spectra
 
     if number <= 5:
-        return bijections.draw(str(number), *_bijection(str(number), data), path)
+        return bijections.draw(str(number), *_bijection(str(number), data), file)
     if number <= 7:
         known = {6: (shapes.FACES, shapes.DATA_FACES), 7: (shapes.BODIES, shapes.DATA_BODIES)}
-        return sequences.draw(str(number), known[number][data is not None], data, path)
+        return sequences.draw(str(number), known[number][data is not None], data, file)
     which, kind = divmod(number - 8, 3)
     draw = (spectra.draw_cubes, spectra.draw_spectrum, spectra.draw_errors)[kind]
-    return draw(str(number), _experiment(which, data), path)
+    return draw(str(number), _experiment(which, data), file)
 
 
 def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:

@@ -15,6 +15,7 @@ Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]
 StretchLaw = Literal["linear", "logarithmic"]
+WeightKind = Literal["smooth", "hats"]
 
 _MOST_TURNS = 100
 
@@ -117,6 +118,45 @@ class FrameOptions:
 
     def __post_init__(self) -> None:
         _require_choices(self, {"mode": Mode, "easing": Easing})
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """How a control is to play a motion through a few of its shapes.
+
+    Parameters
+    ----------
+    count
+        Number of in-betweens between every two keys, even in the control's position; 1 or more.
+    tolerance
+        Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
+        help; ``count`` is then not looked at.
+    weights
+        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbours.
+    also_at
+        Positions of more in-betweens, each between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If a value is of the wrong type or out of its range.
+    """
+
+    count: int = 3
+    tolerance: float = 0.0
+    weights: WeightKind = "smooth"
+    also_at: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        _require_choices(self, {"weights": WeightKind})
+        if not isinstance(self.count, Integral) or isinstance(self.count, bool) or self.count < 0:
+            raise InputError(f"The number of in-betweens is {self.count!r}; it must be a whole number from 0.")
+        numbers = [(self.tolerance, "tolerance"), *((place, "place of an in-between") for place in self.also_at)]
+        for value, what in numbers:
+            if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= value < float("inf"):
+                raise InputError(f"The {what} is {value!r}; it must be a number from 0.")
+        if not all(0.0 < place < 1.0 for place in self.also_at):
+            raise InputError("The place of an in-between must be between 0 and 1.")
 
 
 def _require_choices(options: object, kinds: dict[str, Any]) -> None:

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..solver import errors
-from ..solver.errors import InputError, QC3DError, WorkerError
+from ..solver.errors import InputError, QC3DError, WorkerError, with_remedy
+from ..solver.files.private_folders import PrivateFolder, temporary_place
 from ..solver.frames.task import Outcome, Task
 from ..solver.support.child_python import interpreter
-from ..solver.support.private_folders import PrivateFolder
 from ..solver.support.progress import STAGES, Progress
 from .exchange import read_outcome, write_task
 from .idleness import LONGEST_IDLE, Idleness
@@ -70,14 +70,14 @@ class Worker:
         try:
             self._folder = PrivateFolder()
         except OSError as error:
-            raise WorkerError(_NOT_STARTED.format(error)) from error
+            raise _not_started(error) from error
         self._errors = self._folder.path / "errors.txt"
         try:
             write_task(self._folder.path, task)
             self._process = self._start()
         except OSError as error:
             self._folder.close()
-            raise WorkerError(_NOT_STARTED.format(error)) from error
+            raise _not_started(error) from error
         except BaseException:
             self._folder.close()
             raise
@@ -200,7 +200,6 @@ class Worker:
             raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
 
 
-_NOT_STARTED = "The work cannot be started in a process of its own: {}; make room in the folder for temporary files."
 _HANGS = (
     "The process that does the work has done nothing for {:g} s and was stopped; nothing was changed. Memory may have "
     "run out: try again with a lower quality or fewer in-betweens."
@@ -209,6 +208,13 @@ _GARBLED = (
     "The process that does the work sent something that is no message of it and was stopped; nothing was changed. Try "
     "again, and report it if it happens again."
 )
+
+
+def _not_started(error: OSError) -> WorkerError:
+    return WorkerError(
+        f"The work cannot be started in a process of its own, with temporary files in {temporary_place()}: "
+        f"{with_remedy(error)}."
+    )
 
 
 def _out_of_memory(limits: Limits) -> str:
@@ -274,7 +280,9 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
     elif process.poll() is None:
-        subprocess.run(["taskkill", "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
+        # By its whole name: Windows would look for it in the working folder first.
+        taskkill = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "taskkill.exe")
+        subprocess.run([taskkill, "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
         process.kill()
     process.wait()
 

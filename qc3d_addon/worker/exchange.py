@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.collision.colliders import Collider
+from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
 from ..solver.keys.keypair import KeyPair
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
 _TASK, _OUTCOME = "task.json", "outcome.json"
 
@@ -24,17 +26,18 @@ _TASK, _OUTCOME = "task.json", "outcome.json"
 def write_task(folder: Path, task: Task) -> None:
     """Put a task into an empty folder."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
-        np.savez(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
+        _write(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
     if task.collider is not None:
-        np.savez(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
+        _write(folder / "collider.npz", shapes=task.collider.shapes, faces=task.collider.faces)
     header = {
         "ends": list(task.pairs),
         "through": task.through,
         "fit_options": asdict(task.fit_options),
         "frame_options": asdict(task.frame_options),
+        "play": None if task.play is None else asdict(task.play),
     }
     _write_json(folder / _TASK, header)
 
@@ -55,7 +58,10 @@ def read_task(folder: Path) -> Task:
         with np.load(folder / "collider.npz", allow_pickle=False) as stored:
             collider = Collider(stored["shapes"], stored["faces"])
     options = FitOptions(**header["fit_options"]), FrameOptions(**header["frame_options"])
-    return Task(pairs, tuple(header["through"]), *options, times, kept, collider)
+    play = header["play"]
+    if play is not None:
+        play = PlayOptions(**{**play, "also_at": tuple(play["also_at"])})
+    return Task(pairs, tuple(header["through"]), *options, times, kept, collider, play)
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
@@ -66,7 +72,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
     if outcome.bake is not None:
         arrays: dict[str, Any] = {"times": outcome.bake.times, "frames": outcome.bake.frames}
         arrays |= {f"measure {name}": values for name, values in outcome.bake.measures.items()}
-        np.savez(folder / "bake.npz", **arrays)
+        _write(folder / "bake.npz", **arrays)
         report = outcome.bake.report.as_json()
     _write_json(folder / _OUTCOME, {"ends": list(outcome.fits), "report": report})
 
@@ -86,17 +92,23 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
     }
     if maps.keys() != (task.pairs.keys() if task.needs_fits else set()):
         raise ValueError("the maps belong to other keys")
-    if not len(task.times):
+    if not task.frame_count:
         return Outcome(maps, None)
     with np.load(folder / "bake.npz", allow_pickle=False) as stored:
         times, frames = stored["times"], stored["frames"]
         measures = {name.removeprefix("measure "): stored[name] for name in stored.files if name.startswith("measure ")}
     vertices = len(next(iter(task.pairs.values())).key0)
-    if not np.array_equal(times, task.times) or frames.shape != (len(times), vertices, 3):
+    known = task.times if task.moments is None else task.moments.times
+    is_whole = np.array_equal(times, known) if task.play is None else np.isin(times, known).all() and len(times) > 1
+    if not is_whole or frames.shape != (len(times), vertices, 3):
         raise ValueError("the frames are not those asked for")
     if not np.isfinite(frames).all():
         raise ValueError("a frame has positions that are not finite")
     return Outcome(maps, Bake(times, frames, BakeReport.from_json(header["report"]), measures))
+
+
+def _write(path: Path, **arrays: NDArray[Any]) -> None:
+    write_arrays(path, arrays, is_compressed=False)
 
 
 def _write_json(path: Path, values: dict[str, Any]) -> None:

@@ -18,11 +18,12 @@ import importlib
 import importlib.util
 import json
 import os
-import shutil
 import signal
 import sys
 import tempfile
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -37,11 +38,13 @@ def main(arguments: list[str]) -> None:
     messages = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     tempfile.tempdir = str(folder)  # for what fTetWild needs: gone with the folder, whatever happens
-    threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
+    name = _load(package)
+    importlib.import_module(f"{name}.solver.support.guarded_program").share_group()
+    private_folders = importlib.import_module(f"{name}.solver.files.private_folders")
+    threading.Thread(target=_end_with_parent, args=(partial(private_folders.remove, folder),), daemon=True).start()
     if hasattr(os, "nice"):
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
-    name = _load(package)
     importlib.import_module(f"{name}.start").one_thread_each()
     errors = importlib.import_module(f"{name}.solver.errors")
     try:
@@ -60,6 +63,10 @@ def main(arguments: list[str]) -> None:
         _send(messages, {"error": [type(error).__name__, str(error)]})
     except MemoryError:
         _send(messages, {"error": ["MemoryError", ""]})
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        sentence = f"The process that does the work cannot go on: {errors.with_remedy(error)}{where}."
+        _send(messages, {"error": ["WorkerError", sentence]})
     except RuntimeError as error:
         if not any(word in str(error).lower() for word in _WORDS_OF_TOO_LITTLE_MEMORY):
             raise
@@ -87,12 +94,12 @@ def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
     messages.flush()
 
 
-def _end_with_parent(folder: Path) -> None:
-    """Wait until standard input closes, then remove the folder and end this process and what it started."""
+def _end_with_parent(clear_up: Callable[[], None]) -> None:
+    """Wait until standard input closes, then clear up and end this process and what it started."""
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    shutil.rmtree(folder, ignore_errors=True)
+    clear_up()
     if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
         os.killpg(os.getpid(), signal.SIGKILL)
     os._exit(1)

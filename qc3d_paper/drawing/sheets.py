@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -50,7 +50,7 @@ def straight_blend(row: Row) -> Row:
     return row._replace(label="straight blend", frames=(1.0 - weight) * row.frames[0] + weight * row.frames[-1])
 
 
-def save_sheet(rows: list[Row], view: str, height: int, path: Path) -> None:
+def save_sheet(rows: list[Row], view: str, height: int, file: Path | BinaryIO) -> None:
     """Draw the rows, all through one camera, and save them as a PNG."""
     if view == "auto":
         view = best_view(rows[0].frames[0], rows[0].frames[-1])
@@ -74,7 +74,7 @@ def save_sheet(rows: list[Row], view: str, height: int, path: Path) -> None:
             figure.text(
                 (left + (index + 0.5) * width) / size[0], 1.0 - top / 2 / size[1], label, ha="center", va="center"
             )
-    figure.savefig(path, dpi=_DOTS_PER_INCH, facecolor=BACKGROUND)
+    figure.savefig(file, dpi=_DOTS_PER_INCH, facecolor=BACKGROUND)
     pyplot.close(figure)
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from typing import BinaryIO
 
 import matplotlib
 import numpy as np
@@ -36,7 +36,7 @@ _CLAIM = "A bijection of the cube is rebuilt from its representation with an err
 _EXACT = 1e-9
 
 
-def draw(number: str, title: str, mapping: Mapping, path: Path) -> Caption:
+def draw(number: str, title: str, mapping: Mapping, file: BinaryIO) -> Caption:
     """Draw one of the figures: the map on the cube's faces, a slice of it, and the error of its rebuilding."""
     mesh = mapping.mesh
     rebuilt = reconstruct(mesh, mapping.stretch, Conditions.sliding_cube(mesh))
@@ -50,7 +50,7 @@ def draw(number: str, title: str, mapping: Mapping, path: Path) -> Caption:
     panels[3].hist(np.log10(np.maximum(error, 1e-17)), 40, color="0.4")
     panels[3].set_xlabel("log₁₀ of a vertex's error")
     panels[3].set_ylabel("vertices")
-    figure.savefig(path, dpi=100)
+    figure.savefig(file, dpi=100)
     pyplot.close(figure)
     largest = float(error.max())
     return Caption(

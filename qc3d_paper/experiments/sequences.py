@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -27,7 +28,7 @@ _CLAIMS = {
 }
 
 
-def draw(number: str, poses: tuple[Pose, ...], data: Path | None, path: Path) -> Caption:
+def draw(number: str, poses: tuple[Pose, ...], data: Path | None, file: BinaryIO) -> Caption:
     """Draw three sequences, each by straight blend, mode ``linear`` (the paper's) and mode ``natural``."""
     rows, texts, excesses, folded = [], [], [], 0
     for pose in poses:
@@ -48,7 +49,7 @@ def draw(number: str, poses: tuple[Pose, ...], data: Path | None, path: Path) ->
             f"{excess[1]:.1%}, natural {excess[2]:.1%}; folded tetrahedra in the frames of linear {folds}"
         )
         rows += [_upright(row, pose)._replace(label=f"{pose.second}\n{row.label}") for row in found]
-    save_sheet(rows, "three-quarter" if number == "6" else "auto", 150, path)
+    save_sheet(rows, "three-quarter" if number == "6" else "auto", 150, file)
     worst = np.max(excesses, axis=0)
     if worst[1] < _MILD and not folded:
         holds = "Yes."

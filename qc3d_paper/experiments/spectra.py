@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
+from typing import BinaryIO
 
 import matplotlib
 import numpy as np
@@ -99,7 +100,7 @@ class Experiment:
         return float(((values - self.mapping.values) ** 2).sum(axis=1).mean())
 
 
-def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
+def draw_cubes(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
     """The cube's faces after the map, and after its coordinates and its representation were cut off."""
     mapping, modes = experiment.mapping, min(_SHOWN, experiment.modes)
     mesh = mapping.mesh
@@ -115,7 +116,7 @@ def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
         draw_cube(column[0], mesh, values)
         draw_cube(column[1], mesh, values, behind=True)
         column[0].set_title(title)
-    figure.savefig(path, dpi=100)
+    figure.savefig(file, dpi=100)
     pyplot.close(figure)
     held = mesh.on_cube_face
     moved, kept = (float(np.abs(values - mesh.points)[held].max()) for values in (coordinates, restored.values))
@@ -131,7 +132,7 @@ def draw_cubes(number: str, experiment: Experiment, path: Path) -> Caption:
     )
 
 
-def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
+def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
     """Size of the six channels' coefficients, by mode."""
     codec, mesh = experiment.codecs["published"], experiment.mapping.mesh
     coefficients = np.abs(codec.projected(experiment.mapping, experiment.modes))
@@ -147,7 +148,7 @@ def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
         axes.set_ylim(max(coefficients[1:].max() * 1e-4, 1e-12), max(coefficients.max() * 2.0, 1e-11))
     figure.supxlabel("mode")
     figure.supylabel(f"size of the coefficient; blue: root mean square of {_WINDOW}")
-    figure.savefig(path, dpi=100)
+    figure.savefig(file, dpi=100)
     pyplot.close(figure)
     # Without the constant mode, which holds the identity.
     energy = (coefficients[1:] ** 2).sum(axis=1)
@@ -172,7 +173,7 @@ def draw_spectrum(number: str, experiment: Experiment, path: Path) -> Caption:
     )
 
 
-def draw_errors(number: str, experiment: Experiment, path: Path) -> Caption:
+def draw_errors(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
     """Mean square error by the number of modes, with that between source and target for comparison."""
     every = [count for count in _COUNTS if count <= experiment.modes]
     counts: dict[str, list[int]] = {"coordinates": every, "published": every, "logarithm": every}
@@ -192,7 +193,7 @@ def draw_errors(number: str, experiment: Experiment, path: Path) -> Caption:
     axes.set_xlabel("modes")
     axes.set_ylabel("mean square error, cube units")
     axes.legend(fontsize=9)
-    figure.savefig(path, dpi=100)
+    figure.savefig(file, dpi=100)
     pyplot.close(figure)
     told = ", ".join(
         f"{label} {reached[label][-1] / experiment.reference:.2%} with {counts[label][-1]} modes" for label in reached

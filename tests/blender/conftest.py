@@ -47,14 +47,18 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
 
     def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions) -> FilledCube:
         calls.append(options)
-        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
-        # Kuhn's six: one for each way round from corner 0 to corner 7 along three edges.
-        tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
-        return FilledCube(TetMesh(corners, tets), "six", ())
+        return six_tetrahedra()
 
     monkeypatch.setattr(fit_pair, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
+
+
+def six_tetrahedra() -> FilledCube:
+    """The unit cube of six tetrahedra: one for each way round from corner 0 to corner 7 along three edges (Kuhn)."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
+    tets = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
+    return FilledCube(TetMesh(corners, tets), "six", ())
 
 
 @pytest.fixture
@@ -127,13 +131,32 @@ def state() -> Callable[[], dict[str, Any]]:
         return {
             "objects": {obj.name: _describe_object(obj) for obj in bpy.data.objects},
             "keys": {keys.name: _describe_keys(keys) for keys in bpy.data.shape_keys},
-            "actions": {
-                action.name: [(c.data_path, c.range()[:]) for c in _curves(action)] for action in bpy.data.actions
-            },
-            "meshes": {mesh.name: len(mesh.vertices) for mesh in bpy.data.meshes},
+            "actions": {action.name: _describe_action(action) for action in bpy.data.actions},
+            "meshes": {mesh.name: _describe_mesh(mesh) for mesh in bpy.data.meshes},
+            "nodes": {tree.name: (tree.users, len(tree.nodes)) for tree in bpy.data.node_groups},
+            "collections": [(group.name, group.objects.keys()) for group in bpy.data.collections],
+            "frame": bpy.context.scene.frame_current_final,
+            "selected": sorted(obj.name for obj in bpy.context.selected_objects),
+            "active": getattr(bpy.context.view_layer.objects.active, "name", None),
         }
 
     return describe
+
+
+def _describe_mesh(mesh: bpy.types.Mesh) -> list[Any]:
+    found: list[Any] = [len(mesh.vertices), mesh.color_attributes.active_color_name if mesh.color_attributes else ""]
+    for attribute in mesh.attributes:
+        values = np.zeros(len(attribute.data), dtype=np.float32)
+        if attribute.data_type == 'FLOAT':
+            attribute.data.foreach_get("value", values)
+        found.append((attribute.name, attribute.data_type, values.tobytes()))
+    return found
+
+
+def _describe_action(action: bpy.types.Action) -> list[Any]:
+    slots = [slot.identifier for slot in getattr(action, "slots", ())]
+    points = [(curve.data_path, [point.co[:] for point in curve.keyframe_points]) for curve in _curves(action)]
+    return [action.users, slots, points]
 
 
 def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
@@ -145,6 +168,8 @@ def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
 def _describe_object(obj: bpy.types.Object) -> dict[str, Any]:
     return {
         "properties": {name: value for name, value in obj.items() if isinstance(value, (int, float, str, bytes))},
+        "names": [name for name in obj.keys() if name != "qc3d"],  # noqa: SIM118 - of the panel's choices in 4.5
+        "modifiers": [(modifier.name, modifier.type) for modifier in obj.modifiers],
         "mode": obj.mode,
         "active key": obj.active_shape_key_index,
         "action": obj.animation_data and obj.animation_data.action and obj.animation_data.action.name,
@@ -157,7 +182,7 @@ def _without_seconds(properties: dict[str, Any]) -> dict[str, Any]:
         try:
             record = json.loads(properties[records.PROPERTY])
             for chain in record["chains"]:
-                chain["result"].pop("seconds", None)
+                (chain["result"] or {}).pop("seconds", None)
         except (ValueError, KeyError, TypeError):
             return properties  # not what a bake writes
         properties[records.PROPERTY] = record

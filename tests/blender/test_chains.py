@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,8 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import compat
+from qc3d_addon.blender.heat_map import heat_map
+from qc3d_addon.blender.keys import slider
 from qc3d_addon.blender.store import kept_measures
 from qc3d_addon.blender.store.records import PROPERTY, Record
 
@@ -97,6 +101,14 @@ class TestRemove:
         assert SLIDER in figure
         lamp.driver_remove("location", 0)
 
+    def test_a_driver_of_what_was_deleted_is_no_reason_to_stay(self, figure: bpy.types.Object) -> None:
+        bake()
+        bpy.ops.qc3d.absolute_keys()
+        bpy.data.objects.remove(bpy.data.objects["Figure absolute"])  # its mesh, its keys and their driver are there
+        assert len(bpy.data.shape_keys) == 2
+        assert bpy.ops.qc3d.remove() == {"FINISHED"}
+        assert SLIDER not in figure
+
     def test_the_animators_own_keyframes_stay(self, figure: bpy.types.Object) -> None:
         bake()
         figure.keyframe_insert(f'["{SLIDER}"]', frame=7)
@@ -111,6 +123,52 @@ class TestRemove:
         with pytest.raises(RuntimeError, match="is locked; unlock it"):
             bpy.ops.qc3d.remove()
         assert state() == before
+
+
+def keep_action_elsewhere(block: bpy.types.ID, folder: Path) -> None:
+    """Put the action of an object or of keys into a file of its own, and link it back."""
+    action, path = block.animation_data.action, str(folder / "action.blend")
+    slot = getattr(block.animation_data, "action_slot", None)
+    identifier = None if slot is None else slot.identifier
+    bpy.data.libraries.write(path, {action})
+    bpy.data.actions.remove(action)
+    with bpy.data.libraries.load(path, link=True) as (there, here):
+        here.actions = there.actions
+    block.animation_data.action = here.actions[0]
+    if identifier is not None:
+        block.animation_data.action_slot = here.actions[0].slots[identifier]
+
+
+class TestLinkedActions:
+    """What is in another file cannot be changed: it is found out before anything is."""
+
+    @pytest.mark.parametrize("name", ["remove", "to_keyframes"])
+    def test_of_the_slider(self, figure: bpy.types.Object, state: State, tmp_path: Path, name: str) -> None:
+        bake(use_keyframes=True)
+        keep_action_elsewhere(figure, tmp_path)
+        before = state()
+        with pytest.raises(RuntimeError, match=r"The action '.*' is linked; make it local first"):
+            getattr(bpy.ops.qc3d, name)()
+        assert state() == before
+
+    def test_of_the_keys(self, figure: bpy.types.Object, state: State, tmp_path: Path) -> None:
+        bake()
+        figure.data.shape_keys.key_blocks["Stretch"].keyframe_insert("value", frame=1)
+        keep_action_elsewhere(figure.data.shape_keys, tmp_path)
+        before = state()
+        with pytest.raises(RuntimeError, match=r"The action '.*' is linked; make it local first"):
+            bpy.ops.qc3d.to_keyframes()
+        assert state() == before
+        assert bpy.ops.qc3d.remove() == {"FINISHED"}
+
+    def test_a_bake_with_keyframes(self, figure: bpy.types.Object, state: State, tmp_path: Path) -> None:
+        figure.keyframe_insert("location", frame=1)
+        keep_action_elsewhere(figure, tmp_path)
+        before = state()
+        with pytest.raises(RuntimeError, match=r"The action '.*' is linked; make it local first"):
+            bake(use_keyframes=True)
+        assert state() == before
+        bake()
 
 
 class TestToKeyframes:
@@ -164,6 +222,17 @@ class TestToKeyframes:
             bpy.ops.qc3d.to_keyframes(frame_start=first, frame_end=last)
         assert state() == before
 
+    def test_keyframes_under_a_driver_are_replaced_with_a_word(
+        self, figure: bpy.types.Object, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        bake(count=1)
+        key = figure.data.shape_keys.key_blocks[f"{SLIDER} 1/2"]
+        curve = compat.ensure_fcurve(figure.data.shape_keys, slider.value_path(key.name), ExitStack())
+        curve.keyframe_points.insert(7, 0.25)
+        assert bpy.ops.qc3d.to_keyframes(frame_start=1, frame_end=3) == {"FINISHED"}
+        assert [point.co.x for point in curve.keyframe_points] == [1.0, 3.0]
+        assert f"Keyframes that '{SLIDER} 1/2' had under its driver were replaced" in "".join(capfd.readouterr())
+
     def test_a_deleted_slider(self, figure: bpy.types.Object) -> None:
         bake()
         del figure[SLIDER]
@@ -172,6 +241,26 @@ class TestToKeyframes:
 
 
 class TestAbsoluteKeys:
+    def test_a_deleted_step(self, figure: bpy.types.Object, state: State) -> None:
+        bake(count=3)
+        figure.active_shape_key_index = figure.data.shape_keys.key_blocks.find(f"{SLIDER} 2/4")
+        bpy.ops.object.shape_key_remove()
+        before = state()
+        with pytest.raises(RuntimeError, match=f"Shape keys of '{SLIDER}' were deleted; re-bake it first"):
+            bpy.ops.qc3d.absolute_keys()
+        assert state() == before
+
+    def test_no_keys_and_no_heat_map_of_the_original_stay_with_it(self, figure: bpy.types.Object) -> None:
+        bake(count=1)
+        assert bpy.ops.qc3d.heat_map() == {"FINISHED"}
+        assert bpy.ops.qc3d.absolute_keys() == {"FINISHED"}
+        copy = bpy.data.objects["Figure absolute"]
+        assert len(bpy.data.shape_keys) == 2
+        assert not copy.modifiers
+        assert not [attribute.name for attribute in copy.data.attributes if "QC3D" in attribute.name]
+        assert heat_map.shown(figure) is not None
+        assert bpy.data.node_groups[0].users == 1
+
     def test_the_copy_plays_as_the_original(self, figure: bpy.types.Object, shown: Shown, state: State) -> None:
         bake(count=3)
         keys = figure.data.shape_keys
@@ -249,10 +338,10 @@ class TestMirror:
         bpy.ops.qc3d.mirror()
         ours, image = Record.read(even.data.shape_keys).chains
         assert image.mirror_of == ours.slider
-        worst = [chain.result["worst"]["vertex"] for chain in (ours, image)]
+        worst = [chain.result.worst.vertex for chain in (ours, image)]
         rest = [np.array(even.data.vertices[vertex].co) for vertex in worst]
         np.testing.assert_allclose(rest[1], rest[0] * [-1, 1, 1], atol=1e-6)
-        assert {**ours.result, "worst": None} == {**image.result, "worst": None}
+        assert replace(ours.result, worst=None) == replace(image.result, worst=None)
         keys, count = even.data.shape_keys, len(even.data.vertices)
         kept = [kept_measures.read(keys, chain.slider, count) for chain in (ours, image)]
         for name in kept_measures.MEASURES:

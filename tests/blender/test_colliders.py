@@ -13,8 +13,11 @@ import pytest
 
 from qc3d_addon.blender.bake import plan as plans
 from qc3d_addon.blender.bake.colliders import read_colliders
+from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.collision.colliders import Collider
+from qc3d_addon.solver.frames.task import carry_out
+from qc3d_addon.solver.support.progress import finish
 
 THROUGH = ("Basis", "Lean")
 State = Callable[[], dict[str, Any]]
@@ -100,7 +103,7 @@ class TestBake:
         monkeypatch.setattr(bake_inbetweens, "plan_bake", planned)
         assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders="Off") == {'FINISHED'}
         result = Record.read(figure.data.shape_keys).chains[0].result
-        assert result["collider_crossings"] == 0
+        assert result.collider_crossings == 0
         ball.location.x = 3.0
         bpy.context.view_layer.update()
         assert bpy.ops.qc3d.rebake() == {'FINISHED'}
@@ -108,7 +111,7 @@ class TestBake:
         moved = again.shapes - first.shapes
         np.testing.assert_allclose(moved, np.broadcast_to([1.0, 0.0, 0.0], moved.shape), atol=1e-5)
         bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean")
-        assert Record.read(figure.data.shape_keys).chains[0].result["collider_crossings"] is None
+        assert Record.read(figure.data.shape_keys).chains[0].result.collider_crossings is None
 
     def test_the_panel_names_it_too(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
         figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.colliders = "Basis", "Lean", "Off"
@@ -124,3 +127,38 @@ class TestBake:
         with pytest.raises(RuntimeError, match=sentence):
             bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders=name)
         assert state() == before
+
+
+class TestMeanwhile:
+    """What happens to the objects between the beginning of a bake and its end."""
+
+    SENTENCE = "The objects of 'Off' were changed meanwhile; re-bake to keep off where they are now."
+
+    def notes(self, figure: bpy.types.Object, change: Callable[[], object]) -> tuple[str, ...]:
+        plan = plans.plan_bake(figure, BakeRequest(THROUGH, 1, colliders="Off"))
+        outcome = finish(carry_out(plan.task))
+        change()
+        bpy.context.view_layer.update()
+        return plans.write_bake(plan, outcome).notes
+
+    @pytest.mark.usefixtures("quick_map")
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda: setattr(bpy.data.objects["Ball"], "location", (2.5, 0.0, 0.0)),
+            lambda: setattr(bpy.data.objects["Figure"], "location", (0.5, 0.0, 0.0)),
+            lambda: bpy.data.objects["Ball"].modifiers.new("Finer", 'SUBSURF'),
+            lambda: bpy.data.objects.remove(bpy.data.objects["Ball"]),
+            lambda: setattr(bpy.data.collections["Off"], "name", "Other"),
+        ],
+        ids=["moved", "seen from elsewhere", "finer", "deleted", "collection renamed"],
+    )
+    def test_a_change_is_said(
+        self, figure: bpy.types.Object, ball: bpy.types.Object, change: Callable[[], object]
+    ) -> None:
+        assert self.SENTENCE in self.notes(figure, change)
+        assert self.SENTENCE in Record.read(figure.data.shape_keys).chains[0].result.notes
+
+    @pytest.mark.usefixtures("quick_map")
+    def test_no_change(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+        assert self.SENTENCE not in self.notes(figure, lambda: setattr(ball, "name", "Globe"))

@@ -15,10 +15,9 @@ import pytest
 
 from qc3d_addon.blender.keys import shape_keys, slider
 from qc3d_addon.solver.errors import MeshingError
-from qc3d_addon.solver.frames import chain as pipeline
 from qc3d_addon.solver.frames import task
 from qc3d_addon.solver.frames.bake import Bake
-from qc3d_addon.solver.support.progress import Steps
+from qc3d_addon.solver.support.progress import Progress, Steps
 
 State = Callable[[], dict[str, object]]
 OPERATORS = [bpy.ops.qc3d.bake_inbetweens, bpy.ops.qc3d.prepare]
@@ -71,6 +70,15 @@ def sculpt_mode(figure: bpy.types.Object, folder: Path) -> str:
     return "'Figure' is being edited; go back to Object Mode first."
 
 
+def sculpted_through_another_object(figure: bpy.types.Object, folder: Path) -> str:
+    twin = bpy.data.objects.new("Twin", figure.data)
+    bpy.context.scene.collection.objects.link(twin)
+    bpy.context.view_layer.objects.active = twin
+    bpy.ops.object.mode_set(mode='SCULPT')
+    bpy.context.view_layer.objects.active = figure
+    return "'Twin', which shares its mesh, is being edited; go back to Object Mode first."
+
+
 def absolute_keys(figure: bpy.types.Object, folder: Path) -> str:
     figure.data.shape_keys.use_relative = False
     return "The shape keys of 'Figure' are absolute; switch on Relative, which the slider needs."
@@ -116,6 +124,7 @@ def link_from_library(folder: Path) -> bpy.types.Object:
         one_key,
         edit_mode,
         sculpt_mode,
+        sculpted_through_another_object,
         absolute_keys,
         linked_object,
         linked_mesh,
@@ -228,7 +237,7 @@ class TestLaterFailures:
         baked.data.shape_keys.key_blocks["Basis→Lean 2/3"].lock_shape = True
         before = state()
         assert bake() == (
-            "Error: Shape key 'Basis→Lean 2/3' of an earlier bake is locked; unlock it to bake again."
+            "Error: Shape key 'Basis→Lean 2/3' of an earlier bake is locked; unlock it first."
         )
         assert state() == before
 
@@ -239,11 +248,11 @@ class TestLaterFailures:
     def test_a_map_that_is_not_found(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def prepare(*arguments: object) -> Iterator[pipeline.Progress]:
-            yield pipeline.Progress("fit", 0.5)
+        def fit_pair(*arguments: object) -> Iterator[Progress]:
+            yield Progress("fit", 0.5)
             raise MeshingError("No map without folds was found; try a finer quality.")
 
-        monkeypatch.setattr(task, "prepare", prepare)
+        monkeypatch.setattr(task, "fit_pair", fit_pair)
         before = state()
         assert bake() == "Error: No map without folds was found; try a finer quality."
         assert refused(bpy.ops.qc3d.prepare) == "Error: No map without folds was found; try a finer quality."
@@ -278,7 +287,7 @@ class TestLaterFailures:
             (shape_keys, "set_key_coordinates", 4),
             (slider, "drive", 1),
             (slider, "drive", 5),
-            (slider, "set_keyframes", 1),
+            (slider, "begin_keyframes", 1),
         ],
     )
     @pytest.mark.parametrize("to_key", ["Lean", "Stretch"])

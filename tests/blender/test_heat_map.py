@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +97,7 @@ def test_another_measure_is_shown_as_soon_as_it_is_chosen(baked: bpy.types.Objec
         state = heat_map.shown(baked)
         assert state is not None
         assert state.measure == measure
-    kept_measures.forget(baked.data.shape_keys, SLIDER)
+    kept_measures.forget(baked.data.shape_keys, SLIDER, ExitStack())
     baked.qc3d.measure = "volume"  # which is not known any more
     assert heat_map.shown(baked).measure == "stretch"
 
@@ -151,7 +153,7 @@ def test_it_is_saved_and_works_without_the_add_on(baked: bpy.types.Object, tmp_p
 
 
 def test_in_betweens_that_were_not_measured(baked: bpy.types.Object, state: Callable[[], dict[str, Any]]) -> None:
-    kept_measures.forget(baked.data.shape_keys, SLIDER)
+    kept_measures.forget(baked.data.shape_keys, SLIDER, ExitStack())
     before = state()
     with pytest.raises(RuntimeError, match="were not measured on this mesh; re-bake them first"):
         bpy.ops.qc3d.heat_map(measure="stretch")
@@ -218,15 +220,16 @@ class TestWorstPlace:
         excess = np.maximum(ratio / np.maximum(key, 1.0), np.minimum(key, 1.0) / ratio) - 1.0
         from qc3d_addon.blender.store.records import Record
 
-        stored = Record.read(mesh.shape_keys).chains[0].result["worst"]
-        assert stored["excess"] == pytest.approx(excess.max(), rel=0.05)
+        stored = Record.read(mesh.shape_keys).chains[0].result.worst
+        assert stored.excess == pytest.approx(excess.max(), rel=0.05)
 
     def test_a_mesh_that_lost_the_vertex(self, baked: bpy.types.Object) -> None:
         from qc3d_addon.blender.store.records import Record
 
         record = Record.read(baked.data.shape_keys)
-        record.chains[0].result["worst"]["vertex"] = 10**6
-        record.write(baked.data.shape_keys)
+        result = record.chains[0].result
+        record.chains[0].result = replace(result, worst=replace(result.worst, vertex=10**6))
+        record.write(baked.data.shape_keys, ExitStack())
         with pytest.raises(RuntimeError, match="not measured on this mesh"):
             bpy.ops.qc3d.select_worst()
 

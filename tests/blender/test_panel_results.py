@@ -118,7 +118,7 @@ def test_a_lost_key_is_said(even: bpy.types.Object) -> None:
 
 def test_a_lost_slider_is_said(even: bpy.types.Object) -> None:
     del even[SLIDER]
-    assert f"{SLIDER}: the slider was deleted" in drawn(even).texts
+    assert f"The slider '{SLIDER}' was deleted; re-bake it first." in drawn(even).texts
 
 
 def test_a_mirror_image_is_made_again_from_the_other_side(even: bpy.types.Object) -> None:

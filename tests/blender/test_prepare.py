@@ -10,6 +10,8 @@ from typing import Any, get_args
 import bpy
 import pytest
 
+from qc3d_addon.blender.store.records import Record
+from qc3d_addon.solver.fit import storage
 from qc3d_addon.solver.settings import Mode
 
 PAIR = {"from_key": "Basis", "to_key": "Lean"}
@@ -40,7 +42,7 @@ def test_a_real_map_survives_saving_and_loading(
     kept = map_properties()
     reload(tmp_path)
     assert map_properties() == kept
-    monkeypatch.setattr(task, "prepare", None)  # a call would raise
+    monkeypatch.setattr(task, "fit_pair", None)  # a call would raise
     bake(**real)
     assert map_properties() == kept
 
@@ -100,11 +102,44 @@ def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[An
     assert len(quick_map) == 2
 
 
-def test_a_damaged_map_is_refused_and_prepare_heals_it(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+@pytest.mark.parametrize(("version", "which"), [(-1, "an earlier"), (1, "a later")])
+def test_a_map_of_another_version_is_made_again_and_a_note_says_so(
+    figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, version: int, which: str
+) -> None:
+    monkeypatch.setattr(storage, "FORMAT_VERSION", storage.FORMAT_VERSION + version)
+    assert bpy.ops.qc3d.prepare(**PAIR) == {'FINISHED'}
+    monkeypatch.undo()
+    bake()
+    note = f"The map that was kept from 'Basis' to 'Lean' was stored by {which} version of QC3D and was made again."
+    assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
+    (data,) = map_properties().values()
+    assert storage.why_unusable(bytes(data)) is None
+    before = map_properties()
+    bake(count=2)
+    assert note not in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert map_properties() == before
+
+
+def test_a_map_of_another_version_is_not_saved_as_a_file(
+    figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bake()
+    monkeypatch.setattr(storage, "FORMAT_VERSION", storage.FORMAT_VERSION + 1)
+    with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
+        bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_map_is_made_again_and_a_note_says_so(figure: bpy.types.Object, quick_map: list[Any]) -> None:
     bake()
     (name,) = map_properties()
-    figure.data.shape_keys[name] = map_properties()[name][:100]
-    with pytest.raises(RuntimeError, match="The stored map is damaged; fit the keys again"):
-        bake(count=2)
-    bpy.ops.qc3d.prepare(**PAIR)
+    whole = map_properties()[name]
+    figure.data.shape_keys[name] = whole[:100]
     bake(count=2)
+    note = "The map that was kept from 'Basis' to 'Lean' is damaged and was made again."
+    assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert len(quick_map) == 2
+    assert len(map_properties()[name]) == len(whole)
+    bake(count=2)
+    assert note not in Record.read(figure.data.shape_keys).chains[0].result.notes
+    assert len(quick_map) == 2

@@ -49,8 +49,8 @@ def test_the_straight_blend_is_baked_instead(mirrored: bpy.types.Object, shapes:
     record = Record.read(keys)
     (chain,) = record.chains
     assert record.maps == []
-    assert chain.result["residual"] is None
-    assert chain.result["folds"] is None
+    assert chain.result.residual is None
+    assert chain.result.folds is None
     assert not kept_measures.has(keys, chain.slider)
     assert bpy.ops.qc3d.rebake() == {'FINISHED'}
     with pytest.raises(RuntimeError, match="made without a map; bake in another mode"):

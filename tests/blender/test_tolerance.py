@@ -127,7 +127,7 @@ def bake_through(*names: str, **choices: object) -> Chain:
 def test_no_number_is_enough(figure: bpy.types.Object) -> None:
     chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=1e-5)
     assert chain.intervals == DENSE_STEPS
-    (note,) = [note for note in chain.result["notes"] if "tolerance" in note]
+    (note,) = [note for note in chain.result.notes if "tolerance" in note]
     assert note.startswith("The most in-betweens that a tolerance makes, 47 between every two keys, miss it: vertices")
     missed = float(note.split("about ")[1].split(" off")[0])
     chain = bake_through("Basis", "Lean", count=2 * DENSE_STEPS - 1)
@@ -140,7 +140,7 @@ def test_no_number_is_enough(figure: bpy.types.Object) -> None:
 def test_every_two_keys_of_a_chain_keep_it(figure: bpy.types.Object) -> None:
     keys = ("Lean", "Basis", "Stretch")
     chain = bake_through(*keys, use_tolerance=True, tolerance=0.01)
-    assert not [note for note in chain.result["notes"] if "tolerance" in note]
+    assert not [note for note in chain.result.notes if "tolerance" in note]
     found = chain.intervals // 2  # the hardest two keys decide
     assert DENSE_STEPS % found == 0
     assert 1 < found < DENSE_STEPS
@@ -165,12 +165,12 @@ def test_baked_again_the_keys_stay_unless_more_are_needed(figure: bpy.types.Obje
     bend(figure, 0.1)  # which needs fewer
     assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
     assert keys.keys() == names
-    assert not [note for note in remembered(figure).result["notes"] if "tolerance" in note]
+    assert not [note for note in remembered(figure).result.notes if "tolerance" in note]
     bend(figure, 3.0)
     assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
     again = remembered(figure)
     assert again.intervals > chain.intervals
-    (note,) = [note for note in again.result["notes"] if "tolerance" in note]
+    (note,) = [note for note in again.result.notes if "tolerance" in note]
     said = f"The tolerance needs {again.intervals - 1} in-betweens between every two keys now, before it were"
     assert note == f"{said} {chain.intervals - 1}: their shape keys were replaced."
     bend(figure, 0.1)

@@ -16,7 +16,6 @@ import pytest
 
 from qc3d_addon.cli import interpolate as command
 from qc3d_addon.cli import main
-from qc3d_addon.solver.files import npz
 from qc3d_addon.solver.frames.task import Task
 from qc3d_addon.solver.settings import FitOptions, FrameOptions
 
@@ -244,29 +243,6 @@ def test_files_that_are_no_pair(kind: str, bar_file: Path, tmp_path: Path, capsy
     assert interpolate(path, tmp_path / "frames.npz") == 2
     assert "odd.npz" in refusal(capsys)
     assert not (tmp_path / "frames.npz").exists()
-
-
-def test_what_was_there_stays_when_the_work_fails(tmp_path: Path) -> None:
-    path = tmp_path / "frames.npz"
-    path.write_text("earlier")
-    with pytest.raises(RuntimeError), npz.replacing(path) as new:  # noqa: PT012
-        new.write_text("half")
-        raise RuntimeError
-    assert path.read_text() == "earlier"
-    assert os.listdir(tmp_path) == ["frames.npz"]
-
-
-def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
-    path = tmp_path / "frames.npz"
-    path.write_text("earlier")
-    with npz.replacing(path) as new:
-        assert new.is_absolute()
-        assert new.suffix == path.suffix
-        assert not new.exists()
-        new.write_text("whole")
-        assert path.read_text() == "earlier"
-    assert path.read_text() == "whole"
-    assert os.listdir(tmp_path) == ["frames.npz"]
 
 
 def test_the_program_itself(bar_file: Path, tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def remember(message: str) -> None:
 
 def job() -> object:
     """The work that is going on, or None."""
-    module = sys.modules.get(ADDON + '.blender.jobs')
+    module = sys.modules.get(ADDON + '.blender.bake.jobs')
     return module and module.current()
 
 

@@ -101,8 +101,8 @@ def bake(window: Window, pictures: Path) -> None:
     """Step 4: the button."""
     window.push("qc3d.bake_inbetweens")
     window.move(300, 500)
-    window.ask("import sys; jobs = sys.modules['bl_ext.user_default.qc3d.blender.jobs']")
-    window.wait_for("jobs.current().course.fraction > 0.5")
+    window.ask("import sys; jobs = sys.modules['bl_ext.user_default.qc3d.blender.bake.jobs']")
+    window.wait_for("jobs.current().fraction > 0.5")
     window.shoot(pictures / "quickstart-bake.png", VIEW_AND_STATUS)
     window.wait_for("'Basis→Bend and twist' in bpy.context.active_object.keys()")
     time.sleep(SETTLE)

@@ -52,7 +52,7 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
     child = start(window)
     widths = []
     for fraction in (0.2, 0.6):
-        window.wait_for(f"job().course.fraction > {fraction}")
+        window.wait_for(f"job().fraction > {fraction}")
         with paused(child):
             widths.append(bar_width(window, tmp_path / f"{fraction}.png"))
     assert 0 < widths[0] < widths[1]

@@ -14,7 +14,7 @@ from .harness import Window
 
 BUTTON = "qc3d.heat_map"
 SHADING = "[view()[1].spaces.active.shading.type, view()[1].spaces.active.shading.color_type]"
-SHOWN = "sys.modules[ADDON + '.blender.heat_map'].shown(arm())"
+SHOWN = "sys.modules[ADDON + '.blender.heat_map.heat_map'].shown(arm())"
 FIRST, LAST = (33, 79, 166), (179, 26, 41)  # colours of the ends of the scale of stretch and volume
 
 

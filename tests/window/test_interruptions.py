@@ -134,7 +134,7 @@ def test_a_child_that_dies_or_hangs_is_said_and_changes_nothing(window: Window, 
     child = start(window, "finest")
     os.kill(child, ending)
     if ending == signal.SIGSTOP:
-        window.ask("import sys; sys.modules[ADDON + '.blender.jobs'].current()._worker._deadline = 0.0")
+        window.ask("import sys; sys.modules[ADDON + '.blender.bake.jobs'].current()._worker._deadline = 0.0")
     window.wait_for("job() is None")
     window.wait_for(f"{sentence!r} in reports()")
     assert window.ask("state()") == before

@@ -308,13 +308,15 @@ def test_no_room_for_the_task(monkeypatch: pytest.MonkeyPatch, temporary: Path) 
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(client, "write_task", no_room)
-    assert "cannot be started in a process of its own: [Errno 28] No space left on device" in str(failure())
+    said = str(failure())
+    assert f"temporary files in {temporary}: No space left on device; make room on that disk" in said
     assert list(temporary.iterdir()) == []
 
 
 def test_no_folder_for_temporary_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    assert "make room in the folder for temporary files" in str(failure())
+    said = str(failure())
+    assert f"temporary files in {tmp_path / 'none'}: No such file or directory; make that folder first" in said
 
 
 def test_no_interpreter(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> None:

@@ -51,6 +51,21 @@ def read_colliders(obj: bpy.types.Object, name: str, through: Sequence[str]) -> 
     return Collider.joined(parts)
 
 
+def changed_since(obj: bpy.types.Object, name: str, through: Sequence[str], planned: Collider | None) -> list[str]:
+    """A sentence where the collection's meshes are not any more, as seen from ``obj``, what a bake was planned with."""
+    try:
+        found = read_colliders(obj, name, through)
+    except InputError:
+        found = None
+    if planned is None or (found is not None and _same(found, planned)):
+        return []
+    return [f"The objects of '{name}' were changed meanwhile; re-bake to keep off where they are now."]
+
+
+def _same(one: Collider, other: Collider) -> bool:
+    return np.array_equal(one.shapes, other.shapes) and np.array_equal(one.faces, other.faces)
+
+
 def _shapes(other: bpy.types.Object, through: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Positions (k, c, 3) of a mesh at each key, in its own coordinates, and its triangles (f, 3)."""
     keys = other.data.shape_keys

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.app.handlers import persistent
 
+from .. import compat
+
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome, Task
     from ...worker.client import Limits
@@ -123,5 +125,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop the job."""
-    bpy.app.handlers.load_pre.remove(_on_load)
+    compat.remove_handler(bpy.app.handlers.load_pre, _on_load)
     cancel()

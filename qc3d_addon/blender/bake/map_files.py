@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,6 +29,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
         If the keys were changed since, so that there is no such map any more, or the file cannot be written.
     """
     from ...solver.fit.files import KeptMaps, write_maps
+    from ...solver.fit.storage import why_unusable
     from ...solver.frames.modes import needs_fits
 
     keys = checks.require_object(obj).data.shape_keys
@@ -38,7 +40,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     maps = {}
     for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
-        if data is None:
+        if data is None or why_unusable(data) is not None:
             raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is no more that of the keys; re-bake first.")
         maps[ends] = data
     write_maps(path, KeptMaps(chain.through, request.fit_options, maps))
@@ -66,7 +68,9 @@ def load_maps(obj: bpy.types.Object, path: Path) -> KeptMaps:
     for ends in pairwise(read.through):
         with naming_pair(*ends, read.through):
             from_bytes(read.maps[ends], pairs[ends])
-    for ends, data in read.maps.items():
-        record.keep_map(keys, kept_map(ends, pairs[ends], read.options), data)
-    record.write(keys)
+    with ExitStack() as undo:
+        for ends, data in read.maps.items():
+            record.keep_map(keys, kept_map(ends, pairs[ends], read.options), data, undo)
+        record.write(keys, undo)
+        undo.pop_all()
     return read

@@ -8,8 +8,9 @@ again, and what was read is compared before anything is written.
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -17,11 +18,11 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ...solver.frames.easing import eased
-from ..heat_map import heat_map
-from ..keys import shape_keys
-from ..store import checks, kept_measures, mesh_data, names
+from ..keys import shape_keys, slider
+from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
-from . import colliders
+from ..store.summaries import Summary
+from . import bookkeeping, colliders
 from .request import PREVIEW_STEPS, BakeRequest, BakeResult
 from .step_choice import chosen_steps
 
@@ -45,12 +46,15 @@ class Plan:
         Blender's number of the object, which stays with it for as long as the file is open, through renaming and undo.
     object_name
         What the object was called.
+    notes
+        Sentences for the user about what will be done.
     """
 
     request: BakeRequest
     task: Task
     object_id: int
     object_name: str
+    notes: tuple[str, ...] = ()
 
     def locate(self) -> bpy.types.Object | None:
         """The object, whatever became of it; None where it was deleted."""
@@ -105,6 +109,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
         If the object, the keys or the settings cannot be used.
     """
     # Imported where it is used: scipy would make Blender start slower.
+    from ...solver.fit.storage import why_unusable
     from ...solver.frames.bake import evenly_spaced
     from ...solver.frames.task import Task
 
@@ -113,12 +118,18 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     record = Record.read(keys)
     pairs = mesh_data.read_pairs(obj, request.keys)
     shape_keys.require_writable(obj, _chain(obj, record, request), request.keyframes)
-    kept = {ends: record.kept_map(keys, kept_map(ends, pair, request.fit_options)) for ends, pair in pairs.items()}
-    usable = {ends: data for ends, data in kept.items() if data is not None}
+    usable, notes = {}, []
+    for ends, pair in pairs.items():
+        data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
+        problem = None if data is None else why_unusable(data)
+        if problem is not None:
+            notes.append(f"The map that was kept from '{ends[0]}' to '{ends[1]}' {problem} and was made again.")
+        elif data is not None:
+            usable[ends] = data
     times = evenly_spaced(request.intervals - 1)
     collider = colliders.read_colliders(obj, request.colliders, request.keys)
     task = Task(pairs, request.keys, request.fit_options, request.frame_options, times, usable, collider)
-    return Plan(request, task, obj.session_uid, obj.name)
+    return Plan(request, task, obj.session_uid, obj.name, tuple(notes))
 
 
 def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
@@ -144,6 +155,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
         If the object or the keys cannot be used any more.
     """
     request = request_again(obj, chain)
+    slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
     even = replace(request.frame_options, easing="linear")
     plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, frame_options=even))
     return replace(plan, request=request)
@@ -159,8 +171,10 @@ def write_maps(plan: Plan, outcome: Outcome) -> None:
     """
     keys = plan.find_object().data.shape_keys
     record = Record.read(keys)
-    _keep_maps(keys, record, plan, outcome)
-    record.write(keys)
+    with ExitStack() as undo:
+        _keep_maps(keys, record, plan, outcome, undo)
+        record.write(keys, undo)
+        undo.pop_all()
 
 
 def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
@@ -177,38 +191,36 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
-    chosen, said = chosen_steps(bake, request, chain)
+    chosen, thinned = chosen_steps(bake, request, chain)
     intervals, times = len(chosen) - 1, bake.times[chosen]
     met, passed = _keys_on_the_way(times, request)
     shapes = shape_keys.shapes_by_step(obj, met, bake.frames[chosen])
 
-    notes = shape_keys.write_chain(obj, chain, shapes, intervals, request.keyframes)
-    owner = shape_keys.slider_owner(obj, chain).name
-    notes = [*bake.report.notes, *notes, *said, *passed, *_values_that_add(keys, request)]
-    report = {
-        "object": obj.name,
-        "from": request.keys[0],
-        "via": list(request.keys[1:-1]),
-        "to": request.keys[-1],
-        "count": intervals // (len(request.keys) - 1) - 1,
-        "keys": list(chain.keys.values()),
-        "slider": chain.slider,
-        "slider_object": owner,
-        **bake.report.as_json(),
-        "notes": notes,
-    }
-    chain.request, chain.mirror_of = request.remembered(), ""
-    chain.result = _result(report, bake.times, chosen)
-    measures = {name: values[chosen] for name, values in bake.measures.items()}
-    if measures:
-        kept_measures.keep(keys, chain.slider, measures)
-    else:
-        kept_measures.forget(keys, chain.slider)
-    record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
-    _keep_maps(keys, record, plan, outcome)
-    record.write(keys)
-    heat_map.refresh(obj, chain)
-    return BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
+    with shape_keys.chain_written(obj, chain, shapes, intervals, request.keyframes) as (undo, said):
+        owner = shape_keys.slider_owner(obj, chain).name
+        notes = [*plan.notes, *bake.report.notes, *said, *thinned, *passed]
+        notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
+        notes += _values_that_add(keys, request)
+        report = {
+            "object": obj.name,
+            "from": request.keys[0],
+            "via": list(request.keys[1:-1]),
+            "to": request.keys[-1],
+            "count": intervals // (len(request.keys) - 1) - 1,
+            "keys": list(chain.keys.values()),
+            "slider": chain.slider,
+            "slider_object": owner,
+            **bake.report.as_json(),
+            "notes": notes,
+        }
+        chain.request, chain.mirror_of = request.remembered(), ""
+        chain.result = Summary.of_report(bake.report, bake.times, chosen, notes)
+        record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
+        _keep_maps(keys, record, plan, outcome, undo)
+        measures = {name: values[chosen] for name, values in bake.measures.items()}
+        bookkeeping.remember(obj, record, chain, measures, undo)
+        result = BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
+    return result
 
 
 def kept_map(ends: tuple[str, str], pair: KeyPair, options: FitOptions) -> KeptMap:
@@ -222,9 +234,9 @@ def _same(pair: KeyPair, read: KeyPair) -> bool:
     return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in ("key0", "key1", "faces", "edges"))
 
 
-def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome) -> None:
+def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome, undo: ExitStack) -> None:
     for ends, data in outcome.fits.items():
-        record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.fit_options), data)
+        record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.fit_options), data, undo)
 
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
@@ -235,26 +247,6 @@ def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain
         chain = Chain(request.keys, names.chain_label(request.keys, taken))
         record.chains.append(chain)
     return chain
-
-
-def _result(report: dict[str, Any], times: NDArray[np.float64], chosen: NDArray[np.int64]) -> dict[str, Any]:
-    """What the panel shows of a bake."""
-    worst = report["worst_stretch"]
-    return {
-        "count": len(chosen) - 2,
-        "engine": report["engine"],
-        "seconds": sum(report["seconds"].values()),
-        "folds": _summed(report["folds"]["frames"], chosen),
-        "crossings": sum(report["crossings"][step] for step in chosen),
-        "collider_crossings": _summed(report.get("collider_crossings"), chosen),
-        "worst": {"excess": worst["excess"], "at": float(times[worst["frame"]]), "vertex": worst["vertex"]},
-        "residual": report["residual"] and report["residual"]["rms"],
-        "notes": report["notes"],
-    }
-
-
-def _summed(counts: list[int] | None, chosen: NDArray[np.int64]) -> int | None:
-    return None if counts is None else sum(counts[step] for step in chosen)
 
 
 def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[dict[int, str], list[str]]:

@@ -10,6 +10,7 @@ from typing import Any
 from ...solver.errors import InputError
 from ...solver.settings import FitOptions, FrameOptions
 from ..store import names
+from ..store import stored_values as stored
 
 # Frames of every two keys that a tolerance chooses from; it has many divisors.
 DENSE_STEPS = 48
@@ -85,17 +86,17 @@ class BakeRequest:
             If it is not what this version writes.
         """
         try:
-            options = dict(remembered["settings"])
+            options = dict(stored.plain_dict(remembered["settings"]))
             frame_options = FrameOptions(**{field.name: options.pop(field.name) for field in fields(FrameOptions)})
             return cls(
                 keys,
-                int(remembered["count"]),
+                stored.whole(remembered["count"], 1, names.MAX_STEPS),
                 FitOptions(**options),
                 frame_options,
-                tolerance=float(remembered["tolerance"]),
-                colliders=str(remembered.get("colliders", "")),
+                tolerance=stored.number(remembered["tolerance"], 0.0),
+                colliders=stored.text(remembered.get("colliders", "")),
             )
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, InputError) as error:
             raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,11 +13,14 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...solver.errors import InputError
+from .. import native_files
 from .plan import plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 
 if TYPE_CHECKING:
     from ...solver.support.progress import Progress
+
+_TIMES_THE_SIZE = 4  # of the file that was opened, which may be compressed, for what the bake adds besides keys
 
 OnProgress = Callable[["Progress"], None]
 
@@ -73,28 +77,53 @@ def bake_file(
     QC3DError
         If a file, the object, the keys or the settings cannot be used; no file is written.
     """
-    from ...solver.files.npz import replacing_all
+    from ...solver.files.atomic import replacing_all, require_writable
 
+    reports = [] if report is None else [report]
+    require_writable(output, *reports)
+    require_writable(*reports, inputs=[path])
     _open(path)
+    size = path.stat().st_size
     obj = bpy.data.objects.get(object_name)
     if obj is None:
         meshes = ", ".join(f"'{other.name}'" for other in bpy.data.objects if other.type == 'MESH') or "none"
         raise InputError(f"{path} has no object '{object_name}'; its meshes: {meshes}.")
-    # Opened before the work starts, so that a folder that cannot be written to is found out first.
-    with replacing_all(output, *([] if report is None else [report])) as (unfinished, *unfinished_reports):
-        result = bake_object(obj, request, on_progress)
-        try:
-            bpy.ops.wm.save_as_mainfile(filepath=str(unfinished), copy=True, check_existing=False)
-            for unfinished_report in unfinished_reports:
-                unfinished_report.write_text(json.dumps(result.report, indent=1) + "\n", encoding="utf-8")
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"The results cannot be written: {error}.") from error
+    result = bake_object(obj, request, on_progress)
+    # Beside their places: Blender writes the paths of images and libraries relative to the file's own folder.
+    with replacing_all(output, *reports, beside=True) as (unfinished, *unfinished_reports):
+        _save(unfinished, output, _TIMES_THE_SIZE * size + _bytes_of_keys(obj))
+        for unfinished_report in unfinished_reports:
+            unfinished_report.write_text(json.dumps(result.report, indent=1) + "\n", encoding="utf-8")
     return result
 
 
+def _save(new: Path, output: Path, size: int) -> None:
+    """Save the file that is open, of about ``size`` bytes, as ``new``, which takes the place of ``output``."""
+    from ...solver.files.atomic import require_room
+
+    native_files.require_short(new, output)
+    problem = None
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(new), copy=True, check_existing=False)
+    except RuntimeError as error:
+        problem = native_files.words(error, new, output)
+    else:
+        if new.exists() and not native_files.is_whole(new):
+            problem = "Blender wrote a part of it only"
+    if problem is not None:
+        require_room(output, size)  # Blender calls a full disk a file that is not there, or nothing at all
+        raise InputError(f"{output} cannot be written: {problem}.")
+
+
+def _bytes_of_keys(obj: bpy.types.Object) -> int:
+    return len(obj.data.shape_keys.key_blocks) * len(obj.data.vertices) * 12
+
+
 def _open(path: Path) -> None:
-    if not path.is_file():
-        raise InputError(f"There is no file {path}.")
+    from ...solver.files.npz import require_file
+
+    require_file(path, sys.maxsize)
+    native_files.require_short(path.resolve(), path)
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:

@@ -4,15 +4,21 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
 
 from ...solver.errors import InputError
-from ...solver.files.npz import replacing
-from .. import compat
+from ...solver.files.atomic import replacing, require_room
+from .. import compat, native_files
 from ..keys import shape_keys, slider
 from ..store.records import Chain
+from .absolute_copy import copied
+
+# Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
+_BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
+_BYTES_BESIDE = 2**20
 
 
 def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
@@ -26,47 +32,59 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         If the file cannot be written; what was there is kept.
     """
     scene, layer = context.scene, context.view_layer
-    before = (scene.frame_current, scene.frame_subframe)
-    selected, active = list(context.selected_objects), layer.objects.active
     owner = shape_keys.slider_owner(obj, chain)
-    copy = obj.copy()
-    copy.data = obj.data.copy()
-    collection = bpy.data.collections.new("QC3D export")
-    scene.collection.children.link(collection)
-    collection.objects.link(copy)
-    keys = copy.data.shape_keys
-    try:
+    with ExitStack() as undo:
+        undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
+        undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
+        copy = copied(obj, undo)
+        collection = bpy.data.collections.new("QC3D export")
+        undo.callback(bpy.data.collections.remove, collection)
+        scene.collection.children.link(collection)
+        collection.objects.link(copy)
         copy.animation_data_clear()
         copy[chain.slider] = 0.0
-        for driver in slider.driven_by(keys, chain.slider).values():
+        for driver in slider.driven_by(copy.data.shape_keys, chain.slider).values():
             if driver.variables[0].targets[0].id == owner:
                 driver.variables[0].targets[0].id = copy
-        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider))
-        for frame, value in ((1, 0.0), (frames, 1.0)):
-            curve.keyframe_points.insert(frame, value).interpolation = 'LINEAR'
-        for other in selected:
-            other.select_set(False)
-        copy.select_set(True)
-        layer.objects.active = copy
+        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
+        slider.set_keyframes(curve, (1, frames))
+        _select(layer, {copy}, copy)
+        require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:
+            native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
                     filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
                 )
             except RuntimeError as error:
-                raise InputError(f"{path} cannot be written: {error}") from error
-            if result != {'FINISHED'} or not unfinished.exists():
+                words = native_files.words(error, unfinished, path)
+                raise InputError(f"{path} cannot be written: {words}.") from error
+            if result != {'FINISHED'}:
                 raise InputError(f"{path} was not written by Blender's Alembic exporter; try another folder.")
-    finally:
-        action = copy.animation_data and copy.animation_data.action
-        mesh, key_action = copy.data, keys.animation_data and keys.animation_data.action
-        bpy.data.objects.remove(copy)
-        bpy.data.meshes.remove(mesh)
-        bpy.data.collections.remove(collection)
-        for block in (action, key_action):
-            if block is not None and block.users == 0:
-                bpy.data.actions.remove(block)
-        for other in selected:
-            other.select_set(True)
-        layer.objects.active = active
-        scene.frame_set(before[0], subframe=before[1])
+
+
+def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:
+    """Let these objects be selected and no others."""
+    for obj in layer.objects:
+        if obj is not None:  # as one that has just been removed
+            obj.select_set(obj in objects, view_layer=layer)
+    layer.objects.active = active
+
+
+def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:
+    """More bytes than the file will have. Where the disk gets full, Blender's exporter ends Blender.
+
+    The exporter evaluates modifiers as for a rendering, all but a subdivision surface at the end; the copy is set to
+    show in the viewport what that gives.
+    """
+    shown = [modifier for modifier in copy.modifiers if modifier.show_render]
+    if shown and shown[-1].type == 'SUBSURF' and shown[-1].subdivision_type == 'CATMULL_CLARK':
+        shown.pop()
+    for modifier in copy.modifiers:
+        modifier.show_viewport = modifier in shown
+        if hasattr(modifier, "render_levels"):
+            modifier.levels = modifier.render_levels
+    mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
+    corners = len(mesh.vertices) + len(mesh.loops)
+    once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
+    return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

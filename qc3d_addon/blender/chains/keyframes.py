@@ -4,26 +4,36 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.errors import InputError
 from .. import compat
+from ..bake import bookkeeping
 from ..keys import shape_keys, slider
 from ..store.records import Chain, Record
 from . import remove
 
 
 def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str, frames: range) -> NDArray[np.float64]:
-    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips."""
+    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
+
+    Raises
+    ------
+    InputError
+        If there is no such slider, or it is no number at one of the frames.
+    """
     scene = context.scene
     current, part = scene.frame_current, scene.frame_subframe
     values = []
     try:
         for frame in frames:
             scene.frame_set(frame)
-            values.append(float(owner.evaluated_get(context.evaluated_depsgraph_get())[name]))
+            evaluated = owner.evaluated_get(context.evaluated_depsgraph_get())
+            slider.require(evaluated, name)
+            values.append(float(evaluated[name]))
     finally:
         scene.frame_set(current, subframe=part)
     return np.array(values)
@@ -31,7 +41,7 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
 
 def key_values(chain: Chain, step: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) values of the key at a step where the slider is at ``places`` (k,): what its driver gives."""
-    return np.maximum(0.0, 1.0 - np.abs(places * chain.intervals - step))
+    return np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
 
 
 def bake_to_keyframes(
@@ -46,28 +56,39 @@ def bake_to_keyframes(
     Raises
     ------
     InputError
-        If the slider is gone, or a key or an action cannot be changed; nothing was changed.
+        If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
     """
     keys = obj.data.shape_keys
-    shape_keys.require_writable(obj, chain, None)
-    action = keys.animation_data and keys.animation_data.action
-    if action and (action.library or action.override_library):
-        raise InputError(f"The action '{action.name}' is linked; make it local first.")
-    owner = shape_keys.slider_owner(obj, chain)
-    if chain.slider not in owner:
-        raise InputError(f"The slider '{chain.slider}' was deleted; re-bake it first.")
+    owner = shape_keys.require_removable(obj, chain)
+    shape_keys.require_action(keys)
+    slider.require(owner, chain.slider)
     places = slider_values(context, owner, chain.slider, frames)
-    for step, key in shape_keys.owned_keys(keys, chain).items():
-        values = key_values(chain, step, places)
-        slider.undrive(key)
-        curve = compat.ensure_fcurve(keys, slider.value_path(key.name))
-        _set_keyframes(curve, np.array(frames, dtype=np.float64), values)
-        key.value = float(values[0])
-    remove.forget_chain(obj, record, chain)
-    notes = remove.remove_slider(owner, chain)
+    owned = shape_keys.owned_keys(keys, chain)
+    notes, animated = [], []
+    with ExitStack() as undo:
+        for step, key in owned.items():
+            curve = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
+            if len(curve.keyframe_points):
+                notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
+            animated.append((key, curve, key_values(chain, step, places)))
+        bookkeeping.forget(keys, record, chain, undo)
+        undo.pop_all()
+    _put_in_place(animated, np.array(frames, dtype=np.float64))
+    remove.hide_heat_map(obj, chain)
+    notes += remove.remove_slider(owner, chain)
     keys.update_tag()
     context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
     return notes
+
+
+def _put_in_place(
+    animated: list[tuple[bpy.types.ShapeKey, bpy.types.FCurve, NDArray[np.float64]]], frames: NDArray[np.float64]
+) -> None:
+    """Let curves with these values at ``frames`` do what the drivers of keys did."""
+    for key, curve, values in animated:
+        slider.undrive(key)
+        _set_keyframes(curve, frames, values)
+        key.value = float(values[0])
 
 
 def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:

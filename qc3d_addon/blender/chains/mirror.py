@@ -4,18 +4,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ..heat_map import heat_map
+from ..bake import bookkeeping
 from ..keys import shape_keys
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
+from ..store.summaries import Summary
 
 
 def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
@@ -35,9 +36,7 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
     keys = obj.data.shape_keys
-    steps = shape_keys.owned_keys(keys, chain)
-    if set(steps) != set(chain.keys):
-        raise InputError(f"Shape keys of '{chain.slider}' were deleted; re-bake it first.")
+    steps = shape_keys.all_owned_keys(keys, chain)
     rest = key_coordinates(obj, keys.reference_key.name)
     ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
     obj.data.edges.foreach_get("vertices", ends)
@@ -57,24 +56,21 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         raise InputError(
             f"'{mirrored.slider}' was baked from keys of its own; remove it before it is made from '{chain.slider}'."
         )
-    shape_keys.require_writable(obj, mirrored, None)
-    shape_keys.write_chain(obj, mirrored, shapes, chain.intervals, None)
-    mirrored.request, mirrored.mirror_of = chain.request, chain.slider
-    mirrored.result = _mirrored_result(chain.result, partners)
     measures = kept_measures.read(keys, chain.slider, len(partners))
-    if measures is not None:
-        kept_measures.keep(keys, mirrored.slider, {name: values[:, partners] for name, values in measures.items()})
-    record.write(keys)
-    heat_map.refresh(obj, mirrored)
+    with shape_keys.chain_written(obj, mirrored, shapes, chain.intervals, None) as (undo, _):
+        mirrored.request, mirrored.mirror_of = chain.request, chain.slider
+        mirrored.result = _mirrored_result(chain.result, partners)
+        if measures is not None:
+            measures = {name: values[:, partners] for name, values in measures.items()}
+        bookkeeping.remember(obj, record, mirrored, measures, undo)
     return mirrored
 
 
-def _mirrored_result(result: dict[str, Any], partners: NDArray[np.int64]) -> dict[str, Any]:
+def _mirrored_result(result: Summary | None, partners: NDArray[np.int64]) -> Summary | None:
     """What the panel shows of the mirror image: the same, at the partner of the worst place."""
-    worst = result.get("worst")
-    if not worst or not 0 <= worst["vertex"] < len(partners):
-        return dict(result)
-    return {**result, "worst": {**worst, "vertex": int(partners[worst["vertex"]])}}
+    if result is None or result.worst is None or result.worst.vertex >= len(partners):
+        return result
+    return replace(result, worst=replace(result.worst, vertex=int(partners[result.worst.vertex])))
 
 
 def _other_side(name: str, basis: str) -> str:

@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from contextlib import ExitStack
 
 import bpy
 
 from .. import compat
+from ..bake import bookkeeping
 from ..heat_map import heat_map
 from ..keys import shape_keys, slider
-from ..store import kept_measures
-from ..store.records import PROPERTY, Chain, Record
+from ..store.records import Chain, Record
 
 
 def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
@@ -26,19 +26,24 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     Raises
     ------
     InputError
-        If a key is locked, or the slider's object is linked; nothing was removed.
+        If a key is locked, or the slider's object or its action is linked; nothing was removed.
     """
-    shape_keys.require_writable(obj, chain, None)
-    owner = shape_keys.slider_owner(obj, chain)
-    shape_keys.remove_keys(obj, chain)
-    forget_chain(obj, record, chain)
-    return remove_slider(owner, chain)
+    owner = shape_keys.require_removable(obj, chain)
+    hide_heat_map(obj, chain)
+    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    notes = remove_slider(owner, chain)
+    with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
+        bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
+        undo.pop_all()
+    return notes
 
 
 def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
     """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
     if chain.slider not in owner:
         return []
+    if not slider.is_number(owner, chain.slider):
+        return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
     readers = sum(1 for curve in _drivers() if slider.reads(curve.driver, owner, chain.slider))
     if readers:
         what = "driver reads" if readers == 1 else "drivers read"
@@ -55,30 +60,22 @@ def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
     return notes
 
 
-def forget_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> None:
-    """Forget a chain: its entry in the record, its measures, its heat map, and the maps that no other chain needs."""
-    keys = obj.data.shape_keys
+def hide_heat_map(obj: bpy.types.Object, chain: Chain) -> None:
+    """Hide the heat map of a chain, where it is shown."""
     state = heat_map.shown(obj)
     if state is not None and state.slider == chain.slider:
         heat_map.hide(obj)
-    kept_measures.forget(keys, chain.slider)
-    record.chains.remove(chain)
-    needed = {ends for other in record.chains for ends in pairwise(other.through)}
-    for kept in [kept for kept in record.maps if (kept.from_key, kept.to_key) in set(pairwise(chain.through)) - needed]:
-        record.maps.remove(kept)
-        keys.pop(kept.property_name, None)
-    if record.chains or record.maps:
-        record.write(keys)
-    else:
-        keys.pop(PROPERTY, None)
 
 
 def _drivers() -> Iterator[bpy.types.FCurve]:
-    """All drivers of the file."""
+    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
     for collection in bpy.data.bl_rna.properties:
         if collection.type != 'COLLECTION':
             continue
         for block in getattr(bpy.data, collection.identifier):
+            owner = block.user if isinstance(block, bpy.types.Key) else block
+            if owner is None or not owner.users:
+                continue
             animation = getattr(block, "animation_data", None)
             if animation is not None:
                 yield from animation.drivers

@@ -59,6 +59,17 @@ def scale_of(measure: str, values: NDArray[np.float32]) -> Scale:
     """The scale that shows the values (k, n) of a measure."""
     away = np.percentile(np.abs(np.log(np.maximum(values, 1e-6))), _HELD, axis=1).max()
     end = next((end for end in _ENDS if np.log(end) >= away), _ENDS[-1])
+    return _scale(measure, end)
+
+
+def scale_between(measure: str, low: float, high: float) -> Scale:
+    """The scale of a measure with these ends; raises ValueError or KeyError where ``scale_of`` makes none like it."""
+    if high not in _ENDS or _scale(measure, high).low != low:
+        raise ValueError("no ends of a scale")
+    return _scale(measure, high)
+
+
+def _scale(measure: str, end: float) -> Scale:
     if measure == "dilatation":
         return Scale(_TITLES[measure], 1.0, end, _SEQUENTIAL)
     return Scale(_TITLES[measure], 1.0 / end, end, _DIVERGING)

@@ -11,19 +11,22 @@ of it needs the add-on: it is saved, played and rendered without.
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
+from contextlib import ExitStack
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from .. import compat
 from ..keys import slider
 from ..keys.shape_keys import slider_owner
-from ..store import kept_measures
+from ..store import id_properties, kept_measures
+from ..store import stored_values as stored
 from ..store.kept_measures import MEASURES
 from ..store.records import Chain
-from .colors import Scale, linear, scale_of
+from .colors import Scale, linear, scale_between, scale_of
 
 NAME = "QC3D Heat Map"  # of the modifier, its nodes and the colour attribute
 _STATE = "qc3d_heat_map"
@@ -39,47 +42,60 @@ class Shown(NamedTuple):
 
 def shown(obj: bpy.types.Object | None) -> Shown | None:
     """What an object's heat map shows, None where there is none. Quick enough for a panel."""
-    if obj is None or NAME not in obj.modifiers or _STATE not in obj:
+    if obj is None or obj.type != 'MESH' or _modifier(obj) is None:
         return None
+    state = _state(obj)
     try:
-        state = json.loads(obj[_STATE])
-        return Shown(str(state["slider"]), str(state["measure"]), Scale(*state["scale"]))
+        _, low, high, _ = stored.plain_list(state["scale"])
+        scale = scale_between(str(state["measure"]), stored.number(low), stored.number(high))
+        return Shown(stored.name(state["slider"]), str(state["measure"]), scale)
     except (TypeError, ValueError, KeyError):
         return None
 
 
 def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
-    """Put the heat map of one measure on the object, in place of another one.
+    """Put the heat map of one measure on the object, in place of another one; where that fails, nothing is changed.
 
     Raises
     ------
     InputError
-        If the bake's measures are not kept, or belong to another mesh.
+        If the bake's measures are not kept or belong to another mesh, or the slider cannot play anything.
     """
     mesh = obj.data
     measures = kept_measures.read(mesh.shape_keys, chain.slider, len(mesh.vertices))
     if measures is None or len(measures[measure]) != chain.intervals + 1:
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them first.")
+    owner = slider_owner(obj, chain)
+    slider.require(owner, chain.slider)
+    if NAME in obj.modifiers and _modifier(obj) is None:
+        raise InputError(f"'{obj.name}' has another modifier of the name '{NAME}'; rename that first.")
     scale = scale_of(measure, measures[measure])
-    hide(obj)
-    state = {
-        "slider": chain.slider,
-        "measure": measure,
-        "scale": scale,
-        "active_colour": mesh.color_attributes.active_color_name if mesh.color_attributes else "",
-    }
-    for name, values in measures.items():
-        for step, at_vertices in enumerate(values):
-            attribute = mesh.attributes.new(f"QC3D {name} {step}", 'FLOAT', 'POINT')
-            attribute.data.foreach_set("value", np.ascontiguousarray(at_vertices))
-    mesh.color_attributes.new(NAME, 'FLOAT_COLOR', 'POINT')
-    mesh.color_attributes.active_color_name = NAME
-    tree = _nodes(measure, scale)
-    _drive(tree, slider_owner(obj, chain), chain)
-    modifier = obj.modifiers.new(NAME, 'NODES')
-    modifier.node_group = tree
-    modifier.show_expanded = False
-    obj[_STATE] = json.dumps(state)
+    by_step = {f"QC3D {name} {step}": of_all[step] for name, of_all in measures.items() for step in range(len(of_all))}
+    colour = _active_colour(mesh)
+    if colour == NAME:  # of the one that this one replaces
+        colour = _state(obj).get("active_colour", "")
+    state = {"slider": chain.slider, "measure": measure, "scale": scale, "active_colour": colour}
+    with ExitStack() as undo:
+        undo.callback(_set_active_colour, mesh, _active_colour(mesh))
+        undo.callback(_set_attributes, mesh, _attributes(mesh))
+        _set_attributes(mesh, by_step)
+        mesh.color_attributes.active_color_name = NAME
+        tree = bpy.data.node_groups.new(NAME, 'GeometryNodeTree')
+        undo.callback(bpy.data.node_groups.remove, tree)
+        _make_nodes(tree, measure, scale)
+        _drive(tree, owner, chain)
+        id_properties.put(obj, _STATE, json.dumps(state), undo)
+        modifier = _modifier(obj)
+        if modifier is None:
+            modifier = obj.modifiers.new(NAME, 'NODES')
+            undo.callback(obj.modifiers.remove, modifier)
+            modifier.show_expanded = False
+        before = modifier.node_group
+        undo.callback(setattr, modifier, "node_group", before)
+        modifier.node_group = tree
+        undo.pop_all()
+    if before is not None and before.users == 0:
+        bpy.data.node_groups.remove(before)
 
 
 def refresh(obj: bpy.types.Object, chain: Chain) -> None:
@@ -95,24 +111,60 @@ def refresh(obj: bpy.types.Object, chain: Chain) -> None:
 
 def hide(obj: bpy.types.Object) -> None:
     """Remove the heat map and everything that it added."""
-    modifier = obj.modifiers.get(NAME)
-    if modifier is not None:
+    before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
+    _set_attributes(obj.data, None)
+    _set_active_colour(obj.data, before)
+    if modifier is not None:  # last: for as long as it is there, the heat map is known and can be hidden
         tree = modifier.node_group
         obj.modifiers.remove(modifier)
         if tree is not None and tree.users == 0:
             bpy.data.node_groups.remove(tree)
-    mesh = obj.data
+    obj.pop(_STATE, None)
+
+
+def _modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    modifier = obj.modifiers.get(NAME)
+    return modifier if modifier is not None and modifier.type == 'NODES' else None
+
+
+def _state(obj: bpy.types.Object) -> dict[str, Any]:
+    """What ``show`` kept with the object; empty where there is nothing or something else."""
+    try:
+        return stored.parse(obj.get(_STATE))
+    except ValueError:
+        return {}
+
+
+def _active_colour(mesh: bpy.types.Mesh) -> str:
+    return mesh.color_attributes.active_color_name if mesh.color_attributes else ""
+
+
+def _set_active_colour(mesh: bpy.types.Mesh, name: object) -> None:
+    """Let the viewport show this colour attribute, where there is one of that name."""
+    if isinstance(name, str) and name in mesh.color_attributes.keys():  # noqa: SIM118 - fails on half a surrogate pair
+        mesh.color_attributes.active_color_name = name
+
+
+def _attributes(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.float32]] | None:
+    """Values (n,) of the heat map's attributes by name; None where there are none, not even for its colours."""
+    found = {}
+    for attribute in mesh.attributes:
+        if _is_ours(attribute.name) and attribute.name != NAME and attribute.data_type == 'FLOAT':
+            found[attribute.name] = np.empty(len(attribute.data), dtype=np.float32)
+            attribute.data.foreach_get("value", found[attribute.name])
+    return found if found or NAME in mesh.attributes else None
+
+
+def _set_attributes(mesh: bpy.types.Mesh, values: dict[str, NDArray[np.float32]] | None) -> None:
+    """Give the mesh the heat map's attributes with these values (n,), and the one for its colours; None takes all."""
     for name in [attribute.name for attribute in mesh.attributes if _is_ours(attribute.name)]:
         mesh.attributes.remove(mesh.attributes[name])
-    text = obj.pop(_STATE, None)
-    if text is None:
+    if values is None:
         return
-    try:
-        before = json.loads(text)["active_colour"]
-    except (TypeError, ValueError, KeyError):
-        return
-    if before in mesh.color_attributes:
-        mesh.color_attributes.active_color_name = before
+    for name, at_vertices in values.items():
+        attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
+        attribute.data.foreach_set("value", np.ascontiguousarray(at_vertices))
+    mesh.color_attributes.new(NAME, 'FLOAT_COLOR', 'POINT')
 
 
 def _is_ours(name: str) -> bool:
@@ -122,9 +174,8 @@ def _is_ours(name: str) -> bool:
     return len(words) == 3 and words[0] == "QC3D" and words[1] in MEASURES and words[2].isdigit()
 
 
-def _nodes(measure: str, scale: Scale) -> bpy.types.NodeTree:
+def _make_nodes(tree: bpy.types.NodeTree, measure: str, scale: Scale) -> None:
     """Nodes that blend the two steps around the slider's position, for every measure, and colour one of them."""
-    tree = bpy.data.node_groups.new(NAME, 'GeometryNodeTree')
     tree.is_modifier = True
     for direction in ('INPUT', 'OUTPUT'):
         tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
@@ -155,7 +206,6 @@ def _nodes(measure: str, scale: Scale) -> bpy.types.NodeTree:
             shown_value = value
     geometry = _store(tree, geometry, NAME, 'FLOAT_COLOR', _colour(tree, shown_value, scale))
     link(geometry, make('NodeGroupOutput').inputs[0])
-    return tree
 
 
 def _math(

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import bpy
 
 from . import heat_map
@@ -32,11 +34,13 @@ def leave(context: bpy.types.Context) -> None:
     space = context.space_data
     if space is None or space.type != 'VIEW_3D' or _SHADING not in context.screen:
         return
-    kind, colours = context.screen[_SHADING]
-    del context.screen[_SHADING]
-    space.shading.type = 'SOLID'
-    space.shading.color_type = colours
-    space.shading.type = kind
+    before = context.screen.pop(_SHADING)
+    shading = space.shading
+    shading.type = 'SOLID'
+    with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` kept: the view then stays in Solid
+        kind, colours = before
+        shading.color_type = colours
+        shading.type = kind
 
 
 def register() -> None:

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 
 import bpy
 import numpy as np
@@ -21,9 +22,11 @@ def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKe
     """The shape keys that earlier bakes made for a chain and that are still there, by step.
 
     A key is owned where the record names it and its driver still reads the slider. A name that the record has and the
-    mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver.
+    mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver. A key that
+    was moved to the top, where all others refer to it, is the animator's own from then on.
     """
     drivers = slider.driven_by(keys, chain.slider)
+    drivers.pop(slider.value_path(keys.reference_key.name), None)
     owned, missing = {}, []
     for step, name in chain.keys.items():
         if name in keys.key_blocks and slider.value_path(name) in drivers:
@@ -40,12 +43,43 @@ def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKe
     return owned
 
 
+def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
+    """As ``owned_keys``; raises InputError where one is missing."""
+    owned = owned_keys(keys, chain)
+    if owned.keys() != chain.keys.keys():
+        raise InputError(f"Shape keys of '{chain.slider}' were deleted; re-bake it first.")
+    return owned
+
+
 def slider_owner(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
     """The object whose slider plays the chain: that of an earlier bake (objects may share a mesh), else ``obj``."""
-    for driver in slider.driven_by(obj.data.shape_keys, chain.slider).values():
-        if driver.variables[0].targets[0].id is not None:
-            return driver.variables[0].targets[0].id
+    for driver in _drivers(obj.data.shape_keys, chain):
+        owner = driver.variables[0].targets[0].id
+        if isinstance(owner, bpy.types.Object):
+            return owner
     return obj
+
+
+def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
+    """Whether Blender has stopped the chain's drivers, which it does for good where the slider was NaN once."""
+    driver = next(_drivers(keys, chain), None)
+    return driver is not None and not driver.is_valid
+
+
+def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
+    """Start drivers again that Blender has stopped."""
+    for driver in slider.driven_by(keys, chain.slider).values():
+        driver.is_valid = True
+    keys.update_tag()
+
+
+def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
+    """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
+    for name in chain.keys.values():
+        driver = slider.driver_of(keys, name, chain.slider)
+        if driver is not None:
+            yield driver
+    yield from slider.driven_by(keys, chain.slider).values()
 
 
 def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, int] | None) -> None:
@@ -54,17 +88,45 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
     Raises
     ------
     InputError
-        If a key that the bake replaces is locked, or the slider's object or its action is linked.
+        If a key that the bake replaces is locked, the slider is not a number any more, or its object or its action is
+        linked.
     """
+    owner = _require_unlocked(obj, chain)
+    if chain.slider in owner:
+        slider.require(owner, chain.slider)
+    if keyframes is not None:
+        require_action(owner)
+
+
+def require_removable(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
+    """The object that has the chain's slider, where everything that removing the chain changes can be changed.
+
+    Raises
+    ------
+    InputError
+        If a key is locked, or the slider's object or its action is linked.
+    """
+    owner = _require_unlocked(obj, chain)
+    if chain.keyframes is not None:
+        require_action(owner)
+    return owner
+
+
+def require_action(block: bpy.types.ID) -> None:
+    """Raise InputError where the keyframes of an object or of shape keys cannot be changed."""
+    action = block.animation_data and block.animation_data.action
+    if action and (action.library or action.override_library):
+        raise InputError(f"The action '{action.name}' is linked; make it local first.")
+
+
+def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
     for key in owned_keys(obj.data.shape_keys, chain).values():
         if key.lock_shape:
-            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it to bake again.")
+            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
     owner = slider_owner(obj, chain)
     if owner.library is not None:
         raise InputError(f"'{owner.name}', which has the slider '{chain.slider}', is linked; make it local first.")
-    action = owner.animation_data and owner.animation_data.action
-    if keyframes is not None and action and (action.library or action.override_library):
-        raise InputError(f"The action '{action.name}' is linked; make it local, or bake without keyframes.")
+    return owner
 
 
 def shapes_by_step(
@@ -105,17 +167,18 @@ def shapes_by_step(
     return shapes
 
 
-def write_chain(
+@contextmanager
+def chain_written(
     obj: bpy.types.Object,
     chain: Chain,
     shapes: dict[int, NDArray[np.float32]],
     intervals: int,
     keyframes: tuple[int, int] | None,
-) -> list[str]:
-    """Put the shapes of a chain into shape keys that one slider drives; where that fails, nothing is changed.
+) -> Iterator[tuple[ExitStack, list[str]]]:
+    """Put the shapes of a chain into shape keys that one slider drives; where that or the block fails, take it back.
 
     Keys of an earlier bake with as many steps keep their place, name and driver and get the new shape; those of
-    another number are replaced. No other key changes.
+    another number are replaced when the block ends. No other key changes.
 
     Parameters
     ----------
@@ -130,51 +193,55 @@ def write_chain(
     keyframes
         First and last frame of the slider's keyframes, or None for none.
 
-    Returns
-    -------
-    Sentences for the user.
+    Yields
+    ------
+    What takes everything back where the block fails, to add to, and sentences for the user.
+
+    Raises
+    ------
+    InputError
+        If a key or action cannot be written, or the slider is not a number any more.
     """
-    keys = obj.data.shape_keys
-    owner = slider_owner(obj, chain)
+    require_writable(obj, chain, keyframes)
+    keys, owner = obj.data.shape_keys, slider_owner(obj, chain)
     owned = owned_keys(keys, chain)
     kept = {step: key for step, key in owned.items() if chain.intervals == intervals and step in shapes}
     stale = [key for step, key in owned.items() if step not in kept]
     active = obj.active_shape_key
-    notes = []
+    curve, notes = None, []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
         # A slider that starts where it shows the Basis leaves the object looking as it did.
         start = min(set(range(intervals + 1)) - shapes.keys(), default=0)
-        if slider.ensure_property(owner, chain.slider, start / intervals):
-            undo.callback(owner.pop, chain.slider)
+        slider.ensure_property(owner, chain.slider, start / intervals, undo)
         written = dict(kept)
+        for step, key in kept.items():
+            undo.callback(set_key_coordinates, key, key_coordinates(obj, key.name))
+            set_key_coordinates(key, shapes[step])
+            undo.callback(setattr, key, "relative_key", key.relative_key)
+            key.relative_key = keys.reference_key  # another one may have been moved to the top
+            slider.retarget(slider.driver_of(keys, key.name, chain.slider), owner, undo)
         for step in shapes.keys() - kept.keys():
             name = names.key_name(chain.slider, step, intervals)
             written[step] = _new_key(obj, name, undo)
             set_key_coordinates(written[step], shapes[step])
             slider.drive(written[step], owner, chain.slider, step, intervals)
         if keyframes is not None:
-            note = slider.set_keyframes(owner, chain, keyframes)
-            notes += [note] if note else []
+            curve, notes = slider.begin_keyframes(owner, chain, keyframes, undo)
+        chain.intervals = intervals
+        chain.keys = {step: written[step].name for step in sorted(written)}
+        chain.keyframes = chain.keyframes if curve is None else keyframes
+        yield undo, notes
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
-    for step, key in kept.items():
-        set_key_coordinates(key, shapes[step])
-        slider.retarget(key, owner, chain.slider)
-    chain.intervals = intervals
-    chain.keys = {step: written[step].name for step in sorted(written)}
-    active = None if active in stale else active
-    for key in stale:
-        _remove_key(obj, key)
-    _activate(obj, active)
-    keys.update_tag()
-    return notes
+    if curve is not None:
+        slider.set_keyframes(curve, keyframes)
+    remove_keys(obj, stale)
 
 
-def remove_keys(obj: bpy.types.Object, chain: Chain) -> None:
-    """Remove the shape keys of a chain; the active key stays active where it is not one of them."""
-    active, stale = obj.active_shape_key, list(owned_keys(obj.data.shape_keys, chain).values())
-    active = None if active in stale else active
+def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> None:
+    """Remove shape keys with their drivers; the active key stays active where it is not one of them."""
+    active = None if obj.active_shape_key in stale else obj.active_shape_key
     for key in stale:
         _remove_key(obj, key)
     _activate(obj, active)

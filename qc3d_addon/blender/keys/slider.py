@@ -9,8 +9,12 @@ slider thus shows the first key from the moment of the bake on. What other keys 
 
 from __future__ import annotations
 
+import math
+from contextlib import ExitStack
+
 import bpy
 
+from ...solver.errors import InputError
 from .. import compat
 from ..store.records import Chain
 
@@ -31,10 +35,36 @@ def expression(step: int, intervals: int) -> str:
     return f"max(0, 1 - abs({VARIABLE} * {intervals} - {step}))"
 
 
-def ensure_property(obj: bpy.types.Object, name: str, start: float) -> bool:
-    """Give ``obj`` the slider; True where it is new. One that is there keeps its value."""
-    is_new = name not in obj
-    if is_new:
+def problem(obj: bpy.types.Object, name: str) -> str | None:
+    """Why the slider of that name cannot play anything, or None. Quick enough for a panel."""
+    if name not in obj:
+        return f"The slider '{name}' was deleted; re-bake it first."
+    if not is_number(obj, name):
+        return (
+            f"The slider '{name}' of '{obj.name}' is not a number any more; delete that custom property, then re-bake "
+            "to have it again."
+        )
+    if math.isnan(obj[name]):
+        return f"The slider '{name}' of '{obj.name}' has no value (NaN); give it one, or mend what drives it."
+    return None
+
+
+def is_number(obj: bpy.types.Object, name: str) -> bool:
+    """Whether the slider has a type that can play anything: the user may give it any other."""
+    return isinstance(obj[name], (bool, int, float))
+
+
+def require(obj: bpy.types.Object, name: str) -> None:
+    """Raise InputError unless ``obj`` has the slider of that name and it is a number."""
+    found = problem(obj, name)
+    if found is not None:
+        raise InputError(found)
+
+
+def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitStack) -> None:
+    """Give ``obj`` the slider; one that is there keeps its value. Closing ``undo`` takes a new one away."""
+    if name not in obj:
+        undo.callback(obj.pop, name, None)
         obj[name] = start
         obj.id_properties_ui(name).update(
             min=0.0,
@@ -47,7 +77,6 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float) -> bool:
         )
         # So that a character linked into a shot can be animated with it.
         obj.property_overridable_library_set(data_path(name), True)
-    return is_new
 
 
 def drive(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str, step: int, intervals: int) -> None:
@@ -74,14 +103,25 @@ def undrive(key: bpy.types.ShapeKey) -> None:
         keys.driver_remove(path)
 
 
-def retarget(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str) -> None:
-    """Let the driver of a key read the slider of ``obj``; the object that it read before may have been deleted."""
-    driven_by(key.id_data, name)[value_path(key.name)].variables[0].targets[0].id = obj
+def retarget(driver: bpy.types.Driver, obj: bpy.types.Object, undo: ExitStack) -> None:
+    """Let a driver read the slider of ``obj``; the object that it read before may have been deleted."""
+    target = driver.variables[0].targets[0]
+    undo.callback(setattr, target, "id", target.id)
+    undo.callback(setattr, target, "id_type", target.id_type)
+    target.id_type = 'OBJECT'
+    target.id = obj
+    driver.is_valid = True  # Blender stops a driver for good where its variable was NaN once
 
 
 def value_path(key_name: str) -> str:
     """The path of a shape key's value from its data block."""
     return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].value'
+
+
+def driver_of(keys: bpy.types.Key, key_name: str, name: str) -> bpy.types.Driver | None:
+    """The driver of a shape key's value, where it reads the slider ``name`` alone. Quick enough for a panel."""
+    curve = None if keys.animation_data is None else keys.animation_data.drivers.find(value_path(key_name))
+    return curve.driver if curve is not None and _reads(curve.driver, name) else None
 
 
 def driven_by(keys: bpy.types.Key, name: str) -> dict[str, bpy.types.Driver]:
@@ -110,24 +150,28 @@ def _reads(driver: bpy.types.Driver, name: str) -> bool:
     )
 
 
-def set_keyframes(obj: bpy.types.Object, chain: Chain, wanted: tuple[int, int]) -> str | None:
-    """Animate the slider from 0 to 1 over two frames, linearly; a sentence where that was left undone.
+def begin_keyframes(
+    obj: bpy.types.Object, chain: Chain, wanted: tuple[int, int], undo: ExitStack
+) -> tuple[bpy.types.FCurve | None, list[str]]:
+    """The curve to give keyframes over two frames, None where it is left as it is; a sentence where that is so.
 
     Keyframes that the animator made are never replaced, and neither are those of an earlier bake over the same frames,
-    whose timing may have been edited since.
+    whose timing may have been edited since. Closing ``undo`` takes back what was made.
     """
     path = data_path(chain.slider)
     existing = compat.find_fcurve(obj, path)
     if existing is not None and len(existing.keyframe_points):
         if chain.keyframes is None:
-            return f"The slider '{chain.slider}' is animated already; its keyframes were left as they are."
+            return None, [f"The slider '{chain.slider}' is animated already; its keyframes were left as they are."]
         if chain.keyframes == wanted:
-            return None
-    curve = compat.ensure_fcurve(obj, path)
+            return None, []
+    return compat.ensure_fcurve(obj, path, undo), []
+
+
+def set_keyframes(curve: bpy.types.FCurve, frames: tuple[int, int]) -> None:
+    """Animate the slider from 0 to 1 over two frames, linearly, in place of the keyframes that are there."""
     while len(curve.keyframe_points):
         curve.keyframe_points.remove(curve.keyframe_points[0], fast=True)
-    for frame, value in zip(wanted, (0.0, 1.0), strict=True):
+    for frame, value in zip(frames, (0.0, 1.0), strict=True):
         curve.keyframe_points.insert(frame, value, options={'FAST'}).interpolation = 'LINEAR'
     curve.update()
-    chain.keyframes = wanted
-    return None

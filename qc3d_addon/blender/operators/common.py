@@ -35,9 +35,7 @@ def poll_chains(operator: type[bpy.types.Operator], context: bpy.types.Context) 
     """Whether the active object has in-betweens to work on now."""
     if not poll_active_object(operator, context):
         return False
-    obj = context.active_object
-    has_any = checks.has_chains(obj.data.shape_keys)
-    return _poll(operator, None if has_any else f"'{obj.name}' has no in-betweens yet; bake some first.")
+    return _poll(operator, checks.chains_problem(context.active_object))
 
 
 def chosen_chain(obj: bpy.types.Object | None, slider: str) -> Chain:

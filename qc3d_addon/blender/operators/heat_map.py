@@ -10,10 +10,13 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...solver.errors import QC3DError
+from ...solver.errors import InputError, QC3DError
 from ..heat_map import heat_map, legend
 from ..heat_map.colors import MEASURE_ITEMS
+from ..keys import slider
 from ..keys.shape_keys import owned_keys, slider_owner
+from ..store.records import Chain
+from ..store.summaries import WorstPlace
 from .common import SLIDER, chosen_chain, poll_chains
 
 
@@ -83,31 +86,38 @@ class QC3D_OT_select_worst(bpy.types.Operator):
         obj = context.active_object
         try:
             chain = chosen_chain(obj, self.slider)
+            worst = _worst_place(obj, chain)
         except QC3DError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        worst = chain.result.get("worst")
-        mesh = obj.data
-        if not worst or not 0 <= worst["vertex"] < len(mesh.vertices):
-            self.report({"ERROR"}, f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")
-            return {"CANCELLED"}
-        owner = slider_owner(obj, chain)
-        if chain.slider in owner:
-            owner[chain.slider] = worst["at"]
+        mesh, owner = obj.data, slider_owner(obj, chain)
+        if isinstance(owner[chain.slider], float):
+            owner[chain.slider] = worst.at
             owner.update_tag()
+        else:
+            self.report({"WARNING"}, f"The slider '{chain.slider}' has whole numbers only and stays where it is.")
         # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
         steps = owned_keys(mesh.shape_keys, chain)
         if steps:
-            nearest = min(steps, key=lambda step: abs(step - worst["at"] * chain.intervals))
+            nearest = min(steps, key=lambda step: abs(step - worst.at * chain.intervals))
             obj.active_shape_key_index = mesh.shape_keys.key_blocks.find(steps[nearest].name)
-        _select(mesh, worst["vertex"])
+        _select(mesh, worst.vertex)
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
         if len(evaluated.data.vertices) == len(mesh.vertices):  # no modifier adds vertices
-            context.scene.cursor.location = evaluated.matrix_world @ evaluated.data.vertices[worst["vertex"]].co
+            context.scene.cursor.location = evaluated.matrix_world @ evaluated.data.vertices[worst.vertex].co
         if context.space_data is not None and context.space_data.type == "VIEW_3D":
             context.space_data.region_3d.view_location = context.scene.cursor.location
-        self.report({"INFO"}, f"Vertex {worst['vertex']} at {worst['at']:.2f}: {worst['excess']:.1%} beyond the keys.")
+        self.report({"INFO"}, f"Vertex {worst.vertex} at {worst.at:.2f}: {worst.excess:.1%} beyond the keys.")
         return {"FINISHED"}
+
+
+def _worst_place(obj: bpy.types.Object, chain: Chain) -> WorstPlace:
+    """Where to go; raises InputError where that is not known, or the slider cannot go anywhere."""
+    worst = None if chain.result is None else chain.result.worst
+    if worst is None or worst.vertex >= len(obj.data.vertices):
+        raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")
+    slider.require(slider_owner(obj, chain), chain.slider)
+    return worst
 
 
 def _select(mesh: bpy.types.Mesh, vertex: int) -> None:

@@ -10,7 +10,8 @@ from itertools import pairwise
 import bpy
 
 from ...solver.errors import InputError
-from .records import PROPERTY, Chain
+from . import records
+from .records import Chain
 
 
 def object_problem(obj: bpy.types.Object | None) -> str | None:
@@ -29,6 +30,10 @@ def object_problem(obj: bpy.types.Object | None) -> str | None:
             return f"'{block.name}' is a library override and cannot take new shape keys; make it local first."
     if obj.mode != 'OBJECT' or mesh.is_editmode:
         return f"'{obj.name}' is being edited; go back to Object Mode first."
+    if mesh.users > 1:
+        other = next((other for other in bpy.data.objects if other.data == mesh and other.mode != 'OBJECT'), None)
+        if other is not None:
+            return f"'{other.name}', which shares its mesh, is being edited; go back to Object Mode first."
     if keys is None or len(keys.key_blocks) < 2:
         return f"'{obj.name}' has fewer than two shape keys; add a second one to go to."
     if not keys.use_relative:
@@ -71,9 +76,12 @@ def chain_problem(keys: bpy.types.Key, chain: Chain) -> str | None:
     return f"Shape key '{lost}' was renamed or deleted; give it its name back to re-bake, or bake anew."
 
 
-def has_chains(keys: bpy.types.Key) -> bool:
-    """Whether something was baked on these shape keys. Quick enough for a button that is drawn all the time."""
-    return PROPERTY in keys and '"chains": []' not in keys[PROPERTY]
+def chains_problem(obj: bpy.types.Object) -> str | None:
+    """Why ``obj`` has no in-betweens to work on, or None. Quick enough for a button that is drawn all the time."""
+    state = records.state(obj.data.shape_keys)
+    if state.problem is None and not state.chains:
+        return f"'{obj.name}' has no in-betweens yet; bake some first."
+    return state.problem
 
 
 def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:

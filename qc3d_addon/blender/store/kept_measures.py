@@ -7,11 +7,13 @@ from __future__ import annotations
 import hashlib
 import struct
 import zlib
+from contextlib import ExitStack
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from . import id_properties
 from .names import MAX_STEPS
 from .records import PROPERTY
 
@@ -23,14 +25,12 @@ _MAGIC = b"QCM1"
 Measures = dict[str, NDArray[np.float32]]
 
 
-def keep(keys: bpy.types.Key, slider: str, measures: Measures) -> None:
+def keep(keys: bpy.types.Key, slider: str, measures: Measures, undo: ExitStack) -> None:
     """Keep measures (k, n) by name, rounded to a thousandth or so; all are ratios of 0 or more."""
     count, vertices = measures[MEASURES[0]].shape
     logarithms = np.log2(np.clip(np.stack([measures[name] for name in MEASURES]), 2.0**-20, 2.0**20))
     data = zlib.compress(np.ascontiguousarray(logarithms, dtype="<f2").tobytes(), 6)
-    # Blender cuts bytes at their first zero where they overwrite bytes; a new property keeps them whole.
-    forget(keys, slider)
-    keys[_property(slider)] = _HEADER.pack(_MAGIC, count, vertices) + data
+    id_properties.put(keys, _property(slider), _HEADER.pack(_MAGIC, count, vertices) + data, undo)
 
 
 def read(keys: bpy.types.Key, slider: str, vertices: int) -> Measures | None:
@@ -53,9 +53,9 @@ def read(keys: bpy.types.Key, slider: str, vertices: int) -> Measures | None:
     return dict(zip(MEASURES, values, strict=True)) if np.isfinite(values).all() else None
 
 
-def forget(keys: bpy.types.Key, slider: str) -> None:
+def forget(keys: bpy.types.Key, slider: str, undo: ExitStack) -> None:
     """Remove what was kept for a slider."""
-    keys.pop(_property(slider), None)
+    id_properties.remove(keys, _property(slider), undo)
 
 
 def has(keys: bpy.types.Key, slider: str) -> bool:

@@ -3,21 +3,38 @@
 """What QC3D remembers about its own work, kept with the shape keys it belongs to.
 
 The record is an ID property of the shape keys' data block, so it is saved, copied and undone with them: which keys a
-bake made (never guessed from names), and the prepared map of each pair of keys.
+bake made (never guessed from names), and the prepared map of each pair of keys. A file comes from anywhere: whatever is
+read is checked, types and ranges, before anything is done with it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import bpy
 
 from ...solver.errors import InputError
+from . import id_properties
+from . import stored_values as stored
+from .names import LIMIT, MAX_STEPS
+from .summaries import Summary
 
 PROPERTY = "qc3d"
+VERSION = 1  # of what is written; records from before there was a number have the same form
+
+_MOST_FRAME = 2**31  # from 0, either way
+_LONGEST_KEY = 2 * LIMIT  # bytes: a mirror image goes through keys of names made up for it
+_LONGEST_FINGERPRINT = 1000
+
+
+class DamagedRecordError(InputError):
+    """The record is not what any version writes."""
 
 
 @dataclass
@@ -37,9 +54,10 @@ class Chain:
     keyframes
         First and last frame of the keyframes that a bake put on the slider, or None.
     request
-        What the newest bake was asked for, as plain values; empty for those of older versions.
+        What the newest bake was asked for, as plain values; empty for those of older versions. Only
+        ``requests.BakeRequest.again`` looks into it.
     result
-        What the panel shows of the newest bake, as plain values.
+        What the panel shows of the newest bake, None for those of older versions.
     mirror_of
         Slider of the chain that this one is the mirror image of; empty where it was baked from keys of its own.
     """
@@ -50,8 +68,33 @@ class Chain:
     keys: dict[int, str] = field(default_factory=dict)
     keyframes: tuple[int, int] | None = None
     request: dict[str, Any] = field(default_factory=dict)
-    result: dict[str, Any] = field(default_factory=dict)
+    result: Summary | None = None
     mirror_of: str = ""
+
+    @classmethod
+    def from_json(cls, values: object) -> Chain:
+        """What ``dataclasses.asdict`` makes of it; raises ValueError, KeyError or TypeError for anything else."""
+        found = dict(stored.plain_dict(values))
+        through = tuple(stored.name(name, _LONGEST_KEY) for name in stored.plain_list(found.pop("through")))
+        intervals = stored.whole(found.pop("intervals"), 1, MAX_STEPS)
+        by_text = stored.plain_dict(found.pop("keys"))
+        steps = {str(step): step for step in range(intervals + 1)}
+        keys = {steps[text]: stored.name(name) for text, name in by_text.items()}
+        if len(through) < 2 or any(name == following for name, following in pairwise(through)):
+            raise ValueError("not a row of keys")
+        if len(set(keys.values())) < len(keys):
+            raise ValueError("one key for two steps")
+        keyframes = found.pop("keyframes", None)
+        if keyframes is not None:
+            first, last = (stored.whole(frame, -_MOST_FRAME, _MOST_FRAME) for frame in stored.plain_list(keyframes))
+            if first >= last:
+                raise ValueError("keyframes without time between them")
+            keyframes = (first, last)
+        request, result = _request(found.pop("request", {})), Summary.from_json(found.pop("result", None))
+        slider, mirror_of = stored.name(found.pop("slider")), stored.text(found.pop("mirror_of", ""), LIMIT)
+        if found:
+            raise ValueError("values that are not known")
+        return cls(through, slider, intervals, keys, keyframes, request, result, mirror_of)
 
 
 @dataclass(frozen=True)
@@ -61,6 +104,12 @@ class KeptMap:
     from_key: str
     to_key: str
     fingerprint: str
+
+    @classmethod
+    def from_json(cls, values: object) -> KeptMap:
+        """What ``dataclasses.asdict`` makes of it; raises ValueError or TypeError for anything else."""
+        found = stored.plain_dict(values)
+        return cls(**{name: stored.text(value, _LONGEST_FINGERPRINT) for name, value in found.items()})
 
     @property
     def property_name(self) -> str:
@@ -83,27 +132,41 @@ class Record:
         Raises
         ------
         InputError
-            If the record is not what this module writes.
+            If the record is damaged (DamagedRecordError), or a later version wrote it.
         """
         text = keys.get(PROPERTY)
-        if text is None:
-            return cls()
-        try:
-            stored = json.loads(text)
-            return cls([_chain(entry) for entry in stored["chains"]], [KeptMap(**entry) for entry in stored["maps"]])
-        except (TypeError, ValueError, KeyError, AttributeError) as error:
-            raise InputError(
-                f"The record of earlier bakes on '{keys.name}' is damaged; delete its custom property "
-                f"'{PROPERTY}' and remove the keys of earlier bakes by hand."
-            ) from error
+        return cls() if text is None else cls._parsed(text, keys.name)
 
-    def write(self, keys: bpy.types.Key) -> None:
-        """Keep the record with ``keys``, without the maps of keys that no longer exist."""
-        names = keys.key_blocks.keys()
-        for kept in [kept for kept in self.maps if not {kept.from_key, kept.to_key}.issubset(names)]:
+    @classmethod
+    def _parsed(cls, text: object, owner: str) -> Record:
+        try:
+            values = stored.parse(text)
+            if stored.whole(values.get("version", 0), 0, 2**63) > VERSION:
+                raise InputError(
+                    f"The record of earlier bakes on '{owner}' was written by a later version of QC3D; install that "
+                    "version to work on these shape keys."
+                )
+            chains = [Chain.from_json(entry) for entry in stored.plain_list(values["chains"])]
+            maps = [KeptMap.from_json(entry) for entry in stored.plain_list(values["maps"])]
+            for of_each in ([chain.slider for chain in chains], [chain.through for chain in chains]):
+                if len(set(of_each)) < len(of_each):
+                    raise ValueError("two chains with one slider, or through the same keys")
+        except (ValueError, KeyError, TypeError) as error:
+            raise DamagedRecordError(
+                f"The record of earlier bakes on '{owner}' is damaged; press Forget Damaged Record in the box of the "
+                "bakes, which keeps all shape keys and sliders, then bake anew."
+            ) from error
+        return cls(chains, maps)
+
+    def write(self, keys: bpy.types.Key, undo: ExitStack) -> None:
+        """Keep the record with ``keys``, without the maps of keys that no longer exist; ``undo`` can take it back."""
+        names = set(keys.key_blocks.keys())
+        for kept in [kept for kept in self.maps if not {kept.from_key, kept.to_key} <= names]:
             self.maps.remove(kept)
-            keys.pop(kept.property_name, None)
-        keys[PROPERTY] = json.dumps(asdict(self))
+            id_properties.remove(keys, kept.property_name, undo)
+        text = json.dumps({"version": VERSION, **asdict(self)}, allow_nan=False)
+        self._parsed(text, keys.name)  # what could not be read again is never written
+        id_properties.put(keys, PROPERTY, text, undo)
 
     def chain(self, through: tuple[str, ...]) -> Chain | None:
         """The chain through these keys, if it was baked before."""
@@ -120,19 +183,43 @@ class Record:
         data = keys.get(wanted.property_name) if wanted in self.maps else None
         return data if isinstance(data, bytes) else None
 
-    def keep_map(self, keys: bpy.types.Key, kept: KeptMap, data: bytes) -> None:
+    def keep_map(self, keys: bpy.types.Key, kept: KeptMap, data: bytes, undo: ExitStack) -> None:
         """Keep a map in place of an older one of the same pair; ``write`` must follow."""
         self.maps = [other for other in self.maps if (other.from_key, other.to_key) != (kept.from_key, kept.to_key)]
         self.maps.append(kept)
-        # Blender cuts bytes at their first zero where they overwrite bytes; a new property keeps them whole.
-        keys.pop(kept.property_name, None)
-        keys[kept.property_name] = data
+        id_properties.put(keys, kept.property_name, data, undo)
 
 
-def _chain(entry: dict[str, object]) -> Chain:
-    chain = Chain(**entry)  # type: ignore[arg-type]
-    chain.through = tuple(str(name) for name in chain.through)
-    chain.keys = {int(step): str(name) for step, name in dict(chain.keys).items()}
-    chain.keyframes = None if chain.keyframes is None else (int(chain.keyframes[0]), int(chain.keyframes[1]))
-    chain.request, chain.result = dict(chain.request), dict(chain.result)
-    return chain
+class State(NamedTuple):
+    """What there is to do with a record: the number of its chains, and what is wrong with it."""
+
+    chains: int
+    problem: str | None = None
+    is_damaged: bool = False
+
+
+def state(keys: bpy.types.Key) -> State:
+    """Examine the record of ``keys``; quick enough for buttons that are drawn all the time."""
+    text = keys.get(PROPERTY)
+    if text is None:
+        return State(0)
+    # Anything but a text is damaged, whatever it says.
+    return _state(text if isinstance(text, str) else "", keys.name)
+
+
+@lru_cache(maxsize=64)
+def _state(text: str, owner: str) -> State:
+    try:
+        return State(len(Record._parsed(text, owner).chains))
+    except InputError as error:
+        return State(0, str(error), isinstance(error, DamagedRecordError))
+
+
+def _request(values: object) -> dict[str, Any]:
+    """What a bake was asked for, as it is: plain values, and dictionaries of plain values."""
+    found = stored.plain_dict(values)
+    for value in found.values():
+        for inner in value.values() if isinstance(value, dict) else (value,):
+            if isinstance(inner, (dict, list)):
+                raise ValueError("nested too deep")
+    return found

@@ -18,11 +18,13 @@ from ..operators.chains import (
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
+from ..operators.forget_record import QC3D_OT_forget_record
 from ..operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from ..operators.live_scrub import QC3D_OT_live_scrub
 from ..operators.map_files import QC3D_OT_save_map
-from ..store import checks, kept_measures
+from ..store import checks, kept_measures, records
 from ..store.records import Chain, Record
+from ..store.summaries import Summary
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 
@@ -34,6 +36,7 @@ _MORE = (
     (QC3D_OT_save_map, 'FILE_TICK'),
     (QC3D_OT_remove, 'TRASH'),
 )
+_STOPPED = "Blender stopped the drivers, since the slider had no value for a moment; re-bake to start them again."
 _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
 
 
@@ -49,8 +52,10 @@ class QC3D_PT_results(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.active_object
-        is_mesh = obj is not None and obj.type == 'MESH'
-        return is_mesh and obj.data.shape_keys is not None and checks.has_chains(obj.data.shape_keys)
+        if obj is None or obj.type != 'MESH' or obj.data.shape_keys is None:
+            return False
+        state = records.state(obj.data.shape_keys)
+        return state.chains > 0 or state.problem is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         obj = context.active_object
@@ -58,6 +63,8 @@ class QC3D_PT_results(bpy.types.Panel):
             chains = Record.read(obj.data.shape_keys).chains
         except InputError as error:
             draw_sentence(context, self.layout, str(error), 'ERROR')
+            if records.state(obj.data.shape_keys).is_damaged:
+                self.layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
             return
         for chain in reversed(chains):
             _draw_chain(context, self.layout.box(), obj, chain)
@@ -67,10 +74,13 @@ def _draw_chain(
     context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
 ) -> None:
     owner = shape_keys.slider_owner(obj, chain)
-    if chain.slider in owner:
+    slider_problem = slider.problem(owner, chain.slider)
+    if slider_problem is None:
         layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
     else:
-        layout.label(text=f"{chain.slider}: the slider was deleted", icon='ERROR')
+        draw_sentence(context, layout, slider_problem, 'ERROR')
+    if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+        draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(obj.data.shape_keys, chain)
     buttons = layout.row(align=True)
     if problem is not None and chain.mirror_of:  # it has no keys of its own to be made from
@@ -81,27 +91,10 @@ def _draw_chain(
         buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
         if problem is not None:
             draw_sentence(context, layout, problem, 'ERROR')
-    result = chain.result
-    if result:
-        facts = layout.column(align=True)
-        facts.scale_y = 0.8
-        if chain.mirror_of:
-            draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
-        seconds = "" if chain.mirror_of else f" in {result['seconds']:.1f} s"
-        facts.label(text=f"{result['count']} in-betweens{seconds}")
-        looked_for = {name: what for name, what in _PROBLEMS.items() if result.get(name) is not None}
-        problems = [f"{result[name]} {what}" for name, what in looked_for.items() if result[name]]
-        facts.label(
-            text=", ".join(problems) or f"No {', no '.join(looked_for.values())}",
-            icon='ERROR' if problems else 'CHECKMARK',
-        )
-        if result["residual"] is None:
-            facts.label(text="Straight blend, without a map")
-        else:
-            facts.label(text=f"Fitted within {result['residual']:.2%} of the size")
-            facts.label(text=f"Engine {result['engine']}")
+    if chain.result is not None:
+        _draw_result(context, layout, chain, chain.result)
         _draw_distortion(layout, obj, chain)
-        for note in result["notes"]:
+        for note in chain.result.notes:
             draw_sentence(context, layout, note)
     header, more = layout.panel(f"QC3D_more_{chain.slider}", default_closed=True)
     header.label(text="More")
@@ -111,11 +104,34 @@ def _draw_chain(
             column.operator(operator.bl_idname, icon=icon).slider = chain.slider
 
 
+def _draw_result(
+    context: bpy.types.Context, layout: bpy.types.UILayout, chain: Chain, result: Summary
+) -> None:
+    facts = layout.column(align=True)
+    facts.scale_y = 0.8
+    if chain.mirror_of:
+        draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
+    seconds = "" if chain.mirror_of else f" in {result.seconds:.1f} s"
+    facts.label(text=f"{result.count} in-betweens{seconds}")
+    counts = {what: count for name, what in _PROBLEMS.items() if (count := getattr(result, name)) is not None}
+    problems = [f"{count} {what}" for what, count in counts.items() if count]
+    if counts:
+        facts.label(
+            text=", ".join(problems) or f"No {', no '.join(counts)}",
+            icon='ERROR' if problems else 'CHECKMARK',
+        )
+    if result.residual is None:
+        facts.label(text="Straight blend, without a map")
+    else:
+        facts.label(text=f"Fitted within {result.residual:.2%} of the size")
+        facts.label(text=f"Engine {result.engine}")
+
+
 def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain) -> None:
-    worst = chain.result.get("worst")
-    if worst:
+    worst = None if chain.result is None else chain.result.worst
+    if worst is not None:
         row = layout.row(align=True)
-        row.label(text=f"Worst stretch +{worst['excess']:.1%} at {worst['at']:.2f}")
+        row.label(text=f"Worst stretch +{worst.excess:.1%} at {worst.at:.2f}")
         row.operator(QC3D_OT_select_worst.bl_idname, text="", icon='RESTRICT_SELECT_OFF').slider = chain.slider
     if kept_measures.has(obj.data.shape_keys, chain.slider):
         state = heat_map.shown(obj)

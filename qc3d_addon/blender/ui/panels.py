@@ -14,7 +14,7 @@ from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_k
 from ..operators.map_files import QC3D_OT_load_map
 from ..operators.prepare import QC3D_OT_prepare
 from ..properties import ObjectSettings, key_names
-from ..store import checks
+from ..store import checks, records
 from . import presets
 from .panel_texts import draw_sentence
 
@@ -51,7 +51,7 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             draw_sentence(context, layout, problem)
             return
         notice = engines.engine_notice() if obj.qc3d.engine != 'delaunay' else None
-        if notice is not None and not checks.has_chains(obj.data.shape_keys):  # else it is said with what was baked
+        if notice is not None and not records.state(obj.data.shape_keys).chains:  # else it is said with what was baked
             draw_sentence(context, layout, notice)
 
 

@@ -10,15 +10,50 @@ from typing import TypeVar
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..errors import QC3DError
 from ..triangles.topology import among, distinct
 
 # So many pairs of boxes are compared at once.
-_CHUNK = 2_000_000
-# Pairs around a vertex grow with the square of its triangles; beyond this they are not listed, but met on the way.
+_CHUNK = 500_000
+# Pairs around a vertex grow with the square of its triangles; around one with more than these they are not listed, but
+# its triangles are kept together in the tree, and no two of them are compared.
 _MOST_AROUND_A_VERTEX = 64
+# How much a search may compare: ordinary meshes need 10 to 60 for each triangle.
+_LEAST_WORK, _WORK_PER_TRIANGLE = 5_000_000, 1000
 
 Pairs = tuple[Ints, Ints]
 Values = TypeVar("Values", Floats, Bools)
+
+
+class CrowdedError(QC3DError):
+    """So many triangles lie over each other that comparing them all would take too long."""
+
+
+class Budget:
+    """The work that one search in a surface may cost.
+
+    Parameters
+    ----------
+    triangles : int
+        How many the surface has.
+
+    Attributes
+    ----------
+    left : int
+        Comparisons of two boxes that may still be made; other work counts as so many of these.
+    """
+
+    def __init__(self, triangles: int) -> None:
+        self.left = _LEAST_WORK + _WORK_PER_TRIANGLE * triangles
+
+    def spend(self, work: int) -> None:
+        """Count work before it is done; raises CrowdedError where that is more than may be done."""
+        self.left -= work
+        if self.left < 0:
+            raise CrowdedError(
+                "So many triangles lie over each other that looking for crossings would take too long; remove "
+                "triangles that are there many times over."
+            )
 
 
 class TriangleTree:
@@ -37,6 +72,9 @@ class TriangleTree:
         Triangles that are near each other in all of these share a branch.
     moving : (m,) bool
         Only pairs are looked for of which at least one triangle is among these.
+    groups : (m,) int64, optional
+        Labels; two triangles of the same group are no pair, those with the label -1 belong to none. Without labels,
+        the triangles around each vertex that has very many are a group.
 
     Attributes
     ----------
@@ -44,47 +82,74 @@ class TriangleTree:
         The triangle at each leaf.
     """
 
-    def __init__(self, faces: Ints, shapes: Sequence[Floats], moving: Bools) -> None:
-        self.order = halving_order(np.concatenate([shape[faces].mean(axis=1).T for shape in shapes]))
+    def __init__(self, faces: Ints, shapes: Sequence[Floats], moving: Bools, groups: Ints | None = None) -> None:
+        groups = _hubs(faces) if groups is None else groups
+        places = np.concatenate([shape[faces].mean(axis=1).T for shape in shapes])
+        if groups is not None:
+            # One more coordinate, in which groups are farther apart than anything else is.
+            places = np.concatenate([places, 2.0 * np.ptp(places, axis=1).max() * groups[None]])
+        self.order = halving_order(places)
         self._moves = [moving[self.order]]
-        touching = self._concerned(_around_vertices(faces[self.order]), self._moves[0])
+        # By level the group that all triangles of a node are in, -1 where there is none.
+        self._groups = None if groups is None else [groups[self.order]]
+        touching = _concerned(_around_vertices(faces[self.order]), self._moves[0])
         self._apart: list[Pairs] = []
         while len(self._moves[0]) > 1:
             count = len(self._moves[0])
             self._moves.insert(0, _joined(self._moves[0], np.logical_or, False))
+            if self._groups is not None:
+                self._groups.insert(0, _common(self._groups[0]))
             above = _unique(touching[0] // 2, touching[1] // 2, len(self._moves[0]))
-            self._apart.insert(0, self._concerned(_without(_children(above, count), touching, count), self._moves[1]))
+            self._apart.insert(0, self._wanted(_without(_children(above, count), touching, count), 1))
             touching = above
 
-    @staticmethod
-    def _concerned(pairs: Pairs, moves: Bools) -> Pairs:
-        concerned = moves[pairs[0]] | moves[pairs[1]]
-        return pairs[0][concerned], pairs[1][concerned]
+    def _wanted(self, pairs: Pairs, level: int) -> Pairs:
+        """Pairs of nodes of a level below which something moves that is not all in one group."""
+        pairs = _concerned(pairs, self._moves[level])
+        if self._groups is None:
+            return pairs
+        first, second = (self._groups[level][nodes] for nodes in pairs)
+        apart = (first != second) | (first < 0)
+        return pairs[0][apart], pairs[1][apart]
 
-    def meeting(self, low: Floats, high: Floats) -> Iterator[Pairs]:
-        """Pairs of leaves, the smaller first, whose boxes (3, m), in the order of the leaves, meet; in chunks."""
+    def meeting(self, low: Floats, high: Floats, budget: Budget) -> Iterator[Pairs]:
+        """Pairs of leaves, the smaller first, whose boxes (3, m), in the order of the leaves, meet; in chunks.
+
+        Raises
+        ------
+        CrowdedError
+            If that costs more than the budget has left.
+        """
         boxes = [(low, high)]
         for _ in self._apart:
             low, high = _joined(low, np.minimum, np.inf), _joined(high, np.maximum, -np.inf)
             boxes.insert(0, (low, high))
         nothing = np.empty(0, dtype=np.int64)
-        yield from self._below(0, (nothing, nothing), boxes, True)
+        yield from self._below(0, (nothing, nothing), boxes, budget, True)
 
-    def _below(self, level: int, pairs: Pairs, boxes: list[tuple[Floats, Floats]], known: bool) -> Iterator[Pairs]:
+    def _below(
+        self, level: int, pairs: Pairs, boxes: list[tuple[Floats, Floats]], budget: Budget, known: bool
+    ) -> Iterator[Pairs]:
         """Pairs of leaves that meet below pairs of nodes that do, and, if so wished, below those known to be apart."""
         while level < len(self._apart):
             count = len(self._moves[level + 1])
-            pairs = self._concerned(_children(pairs, count), self._moves[level + 1])
+            pairs = self._wanted(_children(pairs, count), level + 1)
             if known:
                 pairs = _both(pairs, self._apart[level])
             level += 1
+            budget.spend(len(pairs[0]))
             pairs = _meeting(pairs, *boxes[level])
             if len(pairs[0]) > _CHUNK:
                 for start in range(0, len(pairs[0]), _CHUNK):
                     part = slice(start, start + _CHUNK)
-                    yield from self._below(level, (pairs[0][part], pairs[1][part]), boxes, False)
+                    yield from self._below(level, (pairs[0][part], pairs[1][part]), boxes, budget, False)
                 pairs = pairs[0][:0], pairs[1][:0]
         yield pairs
+
+
+def _concerned(pairs: Pairs, moves: Bools) -> Pairs:
+    concerned = moves[pairs[0]] | moves[pairs[1]]
+    return pairs[0][concerned], pairs[1][concerned]
 
 
 def _meeting(pairs: Pairs, low: Floats, high: Floats) -> Pairs:
@@ -106,6 +171,27 @@ def _joined(values: Values, join: np.ufunc, neutral: float) -> Values:
         values = np.concatenate([values, np.full((*values.shape[:-1], 1), neutral, values.dtype)], axis=-1)
     joined: Values = join(values[..., 0::2], values[..., 1::2])
     return joined
+
+
+def _common(groups: Ints) -> Ints:
+    """(k,) groups of the nodes of the level above: that of both children, or -1."""
+    last = np.append(groups, groups[-1:])  # a child without another beside it
+    first, second = groups[0::2], last[1::2][: len(groups[0::2])]
+    return np.where(first == second, first, -1)
+
+
+def _hubs(faces: Ints) -> Ints | None:
+    """(m,) groups of the triangles around each vertex that has very many, -1 for the others; None without such."""
+    around_each = np.bincount(faces.ravel())
+    if around_each.max() <= _MOST_AROUND_A_VERTEX:
+        return None
+    count = around_each[faces]
+    busiest = np.argmax(count, axis=1)[:, None]
+    around = np.take_along_axis(count, busiest, axis=1).ravel() > _MOST_AROUND_A_VERTEX
+    hubs = np.take_along_axis(faces, busiest, axis=1).ravel()[around]
+    groups = np.full(len(faces), -1)
+    groups[around] = np.searchsorted(distinct(hubs), hubs)
+    return groups
 
 
 def _children(pairs: Pairs, count: int) -> Pairs:

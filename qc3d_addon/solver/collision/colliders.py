@@ -14,6 +14,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
 from ..keys.keypair import KeyPair
 from ..triangles.topology import sides
+from .box_tree import CrowdedError
 from .crossings import CrossingSearch
 from .surface_distance import SurfaceDistance
 
@@ -110,15 +111,24 @@ class PosedCollider:
         """Distances from the collider in a frame."""
         return self._distances(self._frames[index])
 
-    def crossings(self, frames: Floats, faces: Ints) -> list[int]:
-        """For each frame (k, n, 3) the pairs of triangles, one of the mesh and one of the collider, that cross."""
+    def crossings(self, frames: Floats, faces: Ints) -> list[int | None]:
+        """For each frame (k, n, 3) the pairs of triangles, one of the mesh and one of the collider, that cross.
+
+        None where so many lie over each other that the search is given up.
+        """
         if not len(frames):
             return []
         together = np.concatenate([faces, self._collider.faces + frames.shape[1]])
         is_mesh = np.arange(len(together)) < len(faces)
         shapes = [np.concatenate(both) for both in zip(frames, self._frames, strict=True)]
-        search = CrossingSearch(together, (shapes[0], shapes[-1]), is_mesh, is_mesh)
-        return [len(search.pairs(shape)) for shape in shapes]
+        search = CrossingSearch(together, (shapes[0], shapes[-1]), sides=is_mesh)
+        counts: list[int | None] = []
+        for shape in shapes:
+            try:
+                counts.append(len(search.pairs(shape)))
+            except CrowdedError:
+                counts.append(None)
+        return counts
 
     def _distances(self, shape: Floats) -> SurfaceDistance:
         if self._last is None or not np.array_equal(self._last[0], shape):

@@ -10,14 +10,18 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..triangles.geometry import cross_product
-from .box_tree import TriangleTree
+from .box_tree import Budget, TriangleTree
 
 # Triangles that go through each other by less than this part of the surface's size touch.
 _TOUCHING = 1e-10
+_WORK_OF_A_TEST = 20  # of two triangles, as comparisons of two boxes
+_ODD = np.uint64(0x9E3779B97F4A7C15)  # multiplying by it scrambles: 2^64 over the golden ratio (Knuth 1973, 6.4)
 
 
 class CrossingSearch:
     """Finds the pairs of triangles that cross, in any shape of one surface.
+
+    A triangle that is listed more than once, in whatever order of its corners, counts as the first of these.
 
     Parameters
     ----------
@@ -35,12 +39,16 @@ class CrossingSearch:
     ) -> None:
         self._count = len(faces)
         moving = np.ones(self._count, dtype=bool) if moving is None else moving
-        self._tree = TriangleTree(faces, shapes, moving) if self._count > 1 and moving.any() else None
+        once = _listed_once(faces)
+        if once is not None:
+            faces, moving, sides = faces[once], moving[once], None if sides is None else sides[once]
+        groups = None if sides is None else sides.astype(np.int64)
+        self._tree = TriangleTree(faces, shapes, moving, groups) if len(faces) > 1 and moving.any() else None
         if self._tree is not None:
-            self._order = self._tree.order
-            self._faces = faces[self._order]
+            order = self._tree.order
+            self._rows = order if once is None else once[order]
+            self._faces = faces[order]
             self._corners = np.ascontiguousarray(self._faces.T)
-            self._sides = None if sides is None else sides[self._order]
 
     def pairs(self, points: Floats) -> Ints:
         """Pairs of triangles that share no vertex and cross in the shape ``points`` (n, 3); touching does not count.
@@ -48,6 +56,11 @@ class CrossingSearch:
         Returns
         -------
         (k, 2) int64, smaller index first, sorted.
+
+        Raises
+        ------
+        CrowdedError
+            If so many triangles lie over each other that comparing them would take too long.
         """
         if self._tree is None:
             return np.empty((0, 2), dtype=np.int64)
@@ -55,15 +68,18 @@ class CrossingSearch:
         one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
         low, high = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
         depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
+        # What is smaller than the depth crosses nothing: the thousands of triangles of a part that is a point, say.
+        tiny = ((high - low) <= 0.5 * depth).all(axis=0)
+        if tiny.any():
+            low[:, tiny] = np.inf
+        budget = Budget(len(self._faces))
         codes = []
-        for first, second in self._tree.meeting(low, high):
-            if self._sides is not None:
-                across = self._sides[first] != self._sides[second]
-                first, second = first[across], second[across]
+        for first, second in self._tree.meeting(low, high, budget):
             apart = ~_share_a_vertex(self._faces[first], self._faces[second])
             first, second = first[apart], second[apart]
+            budget.spend(_WORK_OF_A_TEST * len(first))
             crossing = _cross(corners[:, :, first], corners[:, :, second], depth)
-            found = np.sort(self._order[np.stack([first[crossing], second[crossing]])], axis=0)
+            found = np.sort(self._rows[np.stack([first[crossing], second[crossing]])], axis=0)
             codes.append(found[0] * self._count + found[1])
         ordered = np.sort(np.concatenate(codes))
         return np.stack([ordered // self._count, ordered % self._count], axis=1)
@@ -72,6 +88,18 @@ class CrossingSearch:
 def crossing_pairs(points: Floats, faces: Ints, moving: Bools | None = None) -> Ints:
     """Pairs of triangles (k, 2) that cross in one shape (n, 3); see ``CrossingSearch``."""
     return CrossingSearch(faces, [points], moving).pairs(points)
+
+
+def _listed_once(faces: Ints) -> Ints | None:
+    """(k,) the triangles without repetitions, ascending; None where nothing is repeated."""
+    # Sums of scrambled numbers tell in no time, whatever the order of the corners, that no triangle is repeated.
+    scrambled = np.arange(int(faces.max(initial=-1)) + 1, dtype=np.uint64) * _ODD
+    scrambled = (scrambled ^ scrambled >> np.uint64(29)) * _ODD
+    sums = np.sort(scrambled[faces[:, 0]] + scrambled[faces[:, 1]] + scrambled[faces[:, 2]])
+    if (sums[1:] != sums[:-1]).all():
+        return None
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return np.sort(first) if len(first) < len(faces) else None
 
 
 def _share_a_vertex(first: Ints, second: Ints) -> Bools:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import InputError
-from ..files.npz import replacing, require_file, unreadable
+from ..files.npz import require_file, unreadable
 from .codec import Boundary, Compressed, Scheme
 from .integers import inflated, packed, planes, unpacked
 from .prediction import Predictor
@@ -207,15 +207,6 @@ def from_bytes(data: bytes, source: Source) -> Content:
         remainder,
     )
     return Content(modes, compressed, fields[17:21])
-
-
-def write_compressed(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all. Raises InputError if it cannot be written."""
-    with replacing(path) as unfinished:
-        try:
-            unfinished.write_bytes(data)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def read_compressed(path: Path, source: Source) -> Content:

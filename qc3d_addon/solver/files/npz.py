@@ -1,17 +1,15 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Archives of arrays, read without trusting them; files written whole or not at all."""
+"""Archives of arrays, read without trusting them."""
 
 from __future__ import annotations
 
 import math
-import os
-import shutil
 import stat
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,11 +19,27 @@ from numpy.lib import format as npy_format
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, reason, remedy_of_limit
 
 # All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd shapes.
 _UNREADABLE = (OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
 MOST_BYTES = 2**31  # of a file that is read, and of an array in it
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:
+    """Write arrays to an .npz file, as ``np.savez`` does; of an error nothing is left, no open file and no warning.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    npy: Any = npy_format  # without types in some versions
+    method = zipfile.ZIP_DEFLATED if is_compressed else zipfile.ZIP_STORED
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                npy.write_array(entry, np.asanyarray(array), allow_pickle=False)
 
 
 @contextmanager
@@ -90,7 +104,8 @@ def require_file(path: Path, most: int = MOST_BYTES) -> None:
 
 def unreadable(what: Path | str, error: BaseException) -> InputError:
     """The error to raise where reading failed."""
-    return InputError(f"{what} cannot be read: {_reason(error)}; export it again, or name another file.")
+    remedy = remedy_of_limit(error) or "export it again, or name another file"
+    return InputError(f"{what} cannot be read: {reason(error)}; {remedy}.")
 
 
 def require_sizes(archive: zipfile.ZipFile) -> None:
@@ -126,82 +141,3 @@ def _require_size(archive: zipfile.ZipFile, name: str) -> None:
             raise ValueError("it holds objects of Python, which are never read")
         if file.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
             raise ValueError("it is not as large as it says")
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give the absolute name of a new file beside ``path``, which takes its place when the block ends well.
-
-    Entering tells at once whether the place can be written, before any work; leaving by an error removes the new file
-    and keeps what was there.
-
-    Raises
-    ------
-    InputError
-        If ``path`` cannot be written.
-    """
-    with replacing_all(path) as (new,):
-        yield new
-
-
-@contextmanager
-def replacing_all(*paths: Path) -> Iterator[list[Path]]:
-    """As ``replacing`` for several files: all take their places, or none does."""
-    targets = [path.resolve() for path in paths]
-    with ExitStack() as stack:
-        new = []
-        for path, target in zip(paths, targets, strict=True):
-            new.append(_new_beside(path, target))
-            stack.callback(new[-1].unlink, missing_ok=True)
-        yield new
-        with ExitStack() as undo:
-            for number, (file, target) in enumerate(zip(new, targets, strict=True)):
-                if number < len(new) - 1:  # after the last nothing can fail
-                    undo.callback(_put_back, target, stack.enter_context(_set_aside(target)))
-                try:
-                    file.replace(target)
-                except OSError as error:
-                    raise InputError(f"{target} cannot be written: {_reason(error)}; nothing was.") from error
-            undo.pop_all()
-
-
-def _new_beside(path: Path, target: Path) -> Path:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the name of a file.")
-    new = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        new.touch(exist_ok=False)
-        new.unlink()  # Blender would keep even an empty file as a backup of the one it saves
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
-    return new
-
-
-@contextmanager
-def _set_aside(target: Path) -> Iterator[Path | None]:
-    """Another name for the file that is there now, if there is one, gone when the block ends."""
-    if not target.exists():
-        yield None
-        return
-    kept = target.with_name(f".{target.stem}.{os.getpid()}.old{target.suffix}")
-    try:
-        os.link(target, kept)
-    except OSError:  # not every file system has links
-        shutil.copy2(target, kept)
-    try:
-        yield kept
-    finally:
-        kept.unlink(missing_ok=True)
-
-
-def _put_back(target: Path, kept: Path | None) -> None:
-    if kept is None:
-        target.unlink(missing_ok=True)
-    else:
-        kept.replace(target)
-
-
-def _reason(error: BaseException) -> str:
-    """What went wrong as a clause: the system's own words where there are some, on one line, without a full stop."""
-    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return " ".join(text.split()).rstrip(".") or type(error).__name__

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files.npz import replacing, require_file, unreadable
+from ..files.atomic import replacing
+from ..files.npz import require_file, unreadable
 from ..settings import FitOptions
 
 _FIXED = struct.Struct("<8sHI")  # magic, version, bytes of the header
@@ -54,12 +55,9 @@ def write_maps(path: Path, kept: KeptMaps) -> None:
     }
     text = json.dumps(header).encode()
     with replacing(path) as unfinished:
-        try:
-            unfinished.write_bytes(
-                b"".join([_FIXED.pack(_MAGIC, _VERSION, len(text)), text, *(kept.maps[pair] for pair in ends)])
-            )
-        except OSError as error:
-            raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
+        unfinished.write_bytes(
+            b"".join([_FIXED.pack(_MAGIC, _VERSION, len(text)), text, *(kept.maps[pair] for pair in ends)])
+        )
 
 
 def read_maps(path: Path) -> KeptMaps:

@@ -31,7 +31,8 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     Raises
     ------
     InputError
-        If the second key is the first one mirrored or turned inside out, which no map without folds reaches.
+        If more than half of the second key is mirrored, turned inside out or crossed by itself, which no map without
+        folds reaches.
     MeshingError
         If the engine asked for cannot fill the cube.
 
@@ -41,7 +42,7 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     both keys all the same.
     """
     require_sizes(pair)
-    require_reachable(pair)
+    out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
     yield Progress("mesh", 0.0)
@@ -73,15 +74,15 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
         path,
     )
     missed = fitted.landmark_residual().rms
-    if path.inside_out:
+    if out_of_reach.parts:
         note = (
-            f"{_closed_parts(path.inside_out)} mirrored or turned inside out between the keys: no motion of a volume "
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys: no motion of a volume "
             "does that, and the mode straight may look no worse."
         )
     elif missed > _LARGE_RESIDUAL:
         note = (
-            f"The map misses the second key by {missed:.0%} of its size: a key that is mirrored or turned inside out "
-            "cannot be reached without folds, and its in-betweens are no better than those of the mode straight."
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds comes nearer to what the "
+            "second key crosses or flattens, and the mode straight may look no worse."
         )
     else:
         return fitted
@@ -95,5 +96,5 @@ def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -
         return path, path_to(path, embedding.key1)
 
 
-def _closed_parts(count: int) -> str:
-    return "A closed part of the mesh is" if count == 1 else f"{count} closed parts of the mesh are"
+def _parts(count: int) -> str:
+    return "A part of the mesh is" if count == 1 else f"{count} parts of the mesh are"

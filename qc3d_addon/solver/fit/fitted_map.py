@@ -134,6 +134,10 @@ class FittedMap:
             found = self.fitter.fit(nearest, self.landmarks @ values, _REPAIR_ITERATIONS)
         return found
 
+    def folds_left(self, values: Floats, time: float) -> int:
+        """Folds of a map (N, 3) at ``time`` that cannot be taken away by means of the fitted maps."""
+        return self.folds(self.unfolded(values, time)) if self.folds(values) else 0
+
     def landmark_residual(self) -> Residual:
         """Distance of the mapped landmarks from the second key."""
         embedding = self.embedding

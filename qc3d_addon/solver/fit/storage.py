@@ -24,6 +24,9 @@ from .fitted_map import FittedMap
 FORMAT_VERSION = 2
 _SEAL_LENGTH = 32
 _DAMAGED = "The stored map is damaged; fit the keys again."
+_UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error
+)  # fmt: skip
 
 
 def fingerprint(pair: KeyPair) -> str:
@@ -60,6 +63,33 @@ def to_bytes(fitted: FittedMap) -> bytes:
     return _seal(buffer.getvalue()) + buffer.getvalue()
 
 
+def _is_whole(data: bytes) -> bool:
+    return data[:_SEAL_LENGTH] == _seal(data[_SEAL_LENGTH:])
+
+
+def why_unusable(data: bytes) -> str | None:
+    """Why ``from_bytes`` would refuse bytes that were stored for the same keys, without unpacking them; or None.
+
+    Returns
+    -------
+    The end of a sentence about the stored map: "is damaged", or by which version it was stored.
+    """
+    if not _is_whole(data):
+        return "is damaged"
+    try:
+        with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
+            require_sizes(archive)
+        with np.load(io.BytesIO(data[_SEAL_LENGTH:]), allow_pickle=False) as stored:
+            version = json.loads(bytes(stored["header"]))["version"]
+    except _UNREADABLE:
+        return "is damaged"
+    if not isinstance(version, int):
+        return "is damaged"
+    if version == FORMAT_VERSION:
+        return None
+    return f"was stored by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
+
+
 def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     """Restore a map that ``to_bytes`` stored.
 
@@ -69,7 +99,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
         If the bytes are damaged, of another version, or belong to other keys.
     """
     # Unpacking what is damaged can fail in many ways, or not at all.
-    if data[:_SEAL_LENGTH] != _seal(data[_SEAL_LENGTH:]):
+    if not _is_whole(data):
         raise InputError(_DAMAGED)
     try:
         with zipfile.ZipFile(io.BytesIO(data[_SEAL_LENGTH:])) as archive:
@@ -85,7 +115,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
             notes = tuple(str(note) for note in header["notes"])
             points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
             tets = np.asarray(stored["tets"], dtype=np.int64)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except _UNREADABLE as error:
         raise InputError(_DAMAGED) from error
     if owner != fingerprint(pair):
         raise InputError("The stored map belongs to other keys or another mesh; fit the keys again.")

@@ -30,12 +30,21 @@ class Bake:
     report : BakeReport
     measures : dict
         Distortion of each frame at each vertex by the name of the measure, (k, n) each; empty in mode ``straight``.
+    maps : tuple of (N, 3)
+        Values of each frame's map, cube units; empty in mode ``straight``, and where the work was done elsewhere.
     """
 
     times: Floats
     frames: Floats
     report: BakeReport
     measures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    maps: tuple[Floats, ...] = ()
+
+    def at(self, chosen: Ints) -> Bake:
+        """The bake of some of its frames, by their numbers (c,)."""
+        measures = {name: values[chosen] for name, values in self.measures.items()}
+        maps = tuple(self.maps[index] for index in chosen) if self.maps else ()
+        return Bake(self.times[chosen], self.frames[chosen], self.report.at(chosen.tolist()), measures, maps)
 
 
 def evenly_spaced(count: int) -> Floats:

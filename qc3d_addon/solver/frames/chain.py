@@ -81,6 +81,7 @@ def chain_frames(
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
     notes += welding_notes(pairs) + crossing_notes(crossings, wanted)
+    notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",
         mode=options.mode,
@@ -107,7 +108,8 @@ def chain_frames(
             report.collider_crossings = collider.crossings(frames, pairs[0].faces)
         notes += crossing_notes(report.collider_crossings, wanted, "the colliders")
     report.notes = list(dict.fromkeys(notes))
-    return Bake(wanted, frames, report, measures)
+    maps = tuple(frame.values for frame in ordered if frame.values is not None)
+    return Bake(wanted, frames, report, measures, maps)
 
 
 def _put_keys(made: dict[int, Frame], members: Ints, times: Floats, pair: KeyPair) -> float:

@@ -22,3 +22,15 @@ def eased(times: Floats, easing: Easing) -> Floats:
     if easing == "ease-in-out":
         return np.asarray(times**2 * (3.0 - 2.0 * times))
     return times
+
+
+def uneased(parts: Floats, easing: Easing) -> Floats:
+    """(k,) times, 0..1, at which ``eased`` has come to ``parts`` (k,) of the way."""
+    if easing == "ease-in":
+        return np.asarray(np.sqrt(parts))
+    if easing == "ease-out":
+        return np.asarray(1.0 - np.sqrt(1.0 - parts))
+    if easing == "ease-in-out":
+        middle = 0.5 - np.sin(np.arcsin(1.0 - 2.0 * parts) / 3.0)
+        return np.where((parts > 0.0) & (parts < 1.0), middle, parts)
+    return parts

@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from ..arrays import Floats
+from ..files.npz import write_arrays
 from ..keys.keypair import KeyPair
 
 
@@ -21,7 +20,5 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
     OSError
         If the file cannot be written.
     """
-    with path.open("wb") as file:
-        np.savez_compressed(
-            file, faces=pairs[0].faces, frames=frames, times=times, key0=pairs[0].key0, key1=pairs[-1].key1
-        )
+    ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
+    write_arrays(path, {"faces": pairs[0].faces, "frames": frames, "times": times, **ends})

@@ -22,8 +22,8 @@ class Frame:
     ----------
     positions : (n, 3)
         In the keys' coordinates.
-    crossings : int
-        Pairs of triangles that cross beyond what the worse of the two keys has.
+    crossings : int or None
+        Pairs of triangles that cross beyond what the worse of the two keys has; None where that is not known.
     values : (N, 3), optional
         The frame's map, cube units; none in mode ``straight``.
     certificate : Certificate, optional
@@ -31,13 +31,13 @@ class Frame:
     """
 
     positions: Floats
-    crossings: int
+    crossings: int | None
     values: Floats | None = None
     certificate: Certificate | None = None
 
     @classmethod
     def of(
-        cls, fitted: FittedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int
+        cls, fitted: FittedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int | None
     ) -> Frame:
         """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube."""
         determinant = determinants(fitted.mesh.jacobians(values))

@@ -115,7 +115,7 @@ class NaturalFrames:
         """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
         volumes: list[Floats] = []
         positions: list[Floats] = []
-        excess: list[int] = []
+        excess: list[int | None] = []
         yield 0.0
         few = batches(times.tolist(), self._surface.shapes_at_once)
         for maps, shapes, crossing in in_threads(self._first_try, few):
@@ -130,7 +130,7 @@ class NaturalFrames:
         made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
         return list(made)
 
-    def _certified(self, moment: tuple[float, Floats, Floats, int]) -> Frame:
+    def _certified(self, moment: tuple[float, Floats, Floats, int | None]) -> Frame:
         """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
         time, values, positions, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
@@ -142,7 +142,7 @@ class NaturalFrames:
             found = self._fitted.unfolded(found, time)
         return Frame.of(self._fitted, self._placed(positions, time), found, time, repaired, crossings)
 
-    def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int]]:
+    def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
         """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
         maps = self._volume.maps_at(times)
         shapes = self._shaped(self._surface, self._moments(maps, times))
@@ -177,8 +177,8 @@ class NaturalFrames:
         ]
 
     def _uncrossed(
-        self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int]
-    ) -> Generator[float, None, tuple[list[Floats], list[int]]]:
+        self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
+    ) -> Generator[float, None, tuple[list[Floats], list[int | None]]]:
         """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps.
 
         Returns the positions and what is left of the excess of crossings in each frame.
@@ -193,7 +193,7 @@ class NaturalFrames:
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
             remaining = list(in_threads(self._limit.excess, tried))
-            if sum(remaining) >= sum(excess):
+            if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
                 break
             positions, excess = tried, remaining
         return positions, excess

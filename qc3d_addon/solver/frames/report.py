@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
 from ..keys.keypair import KeyPair
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,43 @@ class WorstStretch:
     vertex: int
 
 
+@dataclass(frozen=True)
+class PlayedReport:
+    """What a control plays between its shapes, looked at in several places between every two of them.
+
+    Parameters
+    ----------
+    weights
+        ``smooth`` or ``hats``.
+    positions
+        In how many places it was looked at.
+    distance
+        The largest distance of a vertex from where the computed motion has it, over the bounding-box diagonal.
+    distance_at
+        The position of the control where that is.
+    worst_stretch
+        The largest excess of an edge over its lengths in the two keys.
+    volume
+        The largest deviation of an enclosed volume from what lies between its two keys, relative to that; None where
+        nothing is closed.
+    folds
+        Folded tetrahedra of the maps through those of the frames that cannot be unfolded as frames are, the most at one
+        position; None in mode ``straight``.
+    crossings
+        Pairs of triangles that cross beyond what the worse of the two keys has, the most at one position; None where
+        that is not known.
+    """
+
+    weights: str
+    positions: int
+    distance: float
+    distance_at: float
+    worst_stretch: float
+    volume: float | None
+    folds: int | None
+    crossings: int | None
+
+
 @dataclass
 class BakeReport:
     """Everything that a bake tells about itself.
@@ -85,6 +124,7 @@ class BakeReport:
         Of the fitted maps and of the frames' maps.
     crossings
         For each frame, pairs of triangles that cross beyond what the worse of its keys has; a key's own frame has 0.
+        None where so many triangles lie over each other that the search was given up.
     certificates
         For each frame; empty in mode ``straight``.
     residual
@@ -98,7 +138,9 @@ class BakeReport:
     peak_memory_mb
         The most memory that the process has held, in megabytes; None where the system does not tell.
     collider_crossings
-        For each frame, pairs of triangles of which one is a collider's; None without colliders.
+        For each frame, pairs of triangles of which one is a collider's, or None as above; None without colliders.
+    played
+        What a control plays between the frames; None where none was asked for.
     notes
         Sentences for the user.
     """
@@ -112,19 +154,33 @@ class BakeReport:
     tetrahedra: int
     welded: list[int]
     folds: Folds
-    crossings: list[int]
+    crossings: list[int | None]
     certificates: list[Certificate]
     residual: Residual | None
     worst_stretch: WorstStretch
     key_error: float
     seconds: dict[str, float]
     peak_memory_mb: float | None
-    collider_crossings: list[int] | None = None
+    collider_crossings: list[int | None] | None = None
+    played: PlayedReport | None = None
     notes: list[str] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
         """The report as plain values that can be written as JSON."""
         return asdict(self)
+
+    def at(self, chosen: list[int]) -> BakeReport:
+        """The report of some of the frames, by their numbers."""
+        worst = self.worst_stretch
+        frame = chosen.index(worst.frame) if worst.frame in chosen else 0
+        return replace(
+            self,
+            folds=replace(self.folds, frames=_at(self.folds.frames, chosen)),
+            crossings=[self.crossings[index] for index in chosen],
+            certificates=[self.certificates[index] for index in chosen] if self.certificates else [],
+            collider_crossings=_at(self.collider_crossings, chosen),
+            worst_stretch=replace(worst, frame=frame),
+        )
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> BakeReport:
@@ -134,6 +190,7 @@ class BakeReport:
         parts["certificates"] = [Certificate(**one) for one in parts["certificates"]]
         parts["residual"] = None if parts["residual"] is None else Residual(**parts["residual"])
         parts["worst_stretch"] = WorstStretch(**parts["worst_stretch"])
+        parts["played"] = None if parts["played"] is None else PlayedReport(**parts["played"])
         return cls(**parts)
 
 
@@ -148,11 +205,24 @@ def welding_notes(pairs: Sequence[KeyPair]) -> list[str]:
     ]
 
 
-def crossing_notes(crossings: Sequence[int], times: Floats, subject: str = "itself") -> list[str]:
-    """A sentence about the frame at ``times`` (k,) that crosses ``subject`` most, if one does."""
-    if not any(crossings):
-        return []
-    worst = int(np.argmax(crossings))
-    beyond = " more than a key" if subject == "itself" else ""
-    pairs = f"{crossings[worst]} {'pair' if crossings[worst] == 1 else 'pairs'} of triangles"
-    return [f"The frame at {times[worst]:.3g} crosses {subject} in {pairs}{beyond}."]
+def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
+    return None if counts is None else [counts[index] for index in chosen]
+
+
+def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str = "itself") -> list[str]:
+    """Sentences about the frame at ``times`` (k,) that crosses ``subject`` most, and about frames of which that is not
+    known, where there are any."""
+    notes = []
+    counts = [count or 0 for count in crossings]
+    if any(counts):
+        worst = int(np.argmax(counts))
+        beyond = " more than a key" if subject == "itself" else ""
+        pairs = f"{counts[worst]} {'pair' if counts[worst] == 1 else 'pairs'} of triangles"
+        notes.append(f"The frame at {times[worst]:.3g} crosses {subject} in {pairs}{beyond}.")
+    if None in crossings:
+        notes.append(
+            f"Whether the mesh crosses {subject} is not known in {crossings.count(None)} of {len(crossings)} frames: "
+            "so many triangles lie over each other there that looking would take too long; remove those that are "
+            "there many times over."
+        )
+    return notes

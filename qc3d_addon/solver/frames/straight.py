@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..collision.colliders import CollisionResolver
-from ..collision.self_crossings import CrossingLimit
+from ..collision.self_crossings import PairCrossings
 from ..keys.keypair import KeyPair
 from .frame import Frame
 
@@ -22,10 +22,8 @@ class StraightFrames:
 
     def __init__(self, pair: KeyPair) -> None:
         self._pair = pair
-        # Crossings are counted in units that suit them; powers of two lose nothing, however large or small the keys.
-        self._exponent = int(np.frexp(max(float(np.ptp(key / 2.0, axis=0).max()) for key in (pair.key0, pair.key1)))[1])
         self._still = (pair.key0 == pair.key1).all(axis=1)
-        self._limit = CrossingLimit(pair.welded_faces, self._scaled(pair.key0), self._scaled(pair.key1), self._still)
+        self._crossings = PairCrossings(pair)
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
@@ -36,12 +34,8 @@ class StraightFrames:
             positions = pair.key1 if time == 1.0 else _blended(pair.key0, pair.key1, time)
             if resolver is not None:
                 positions = resolver.cleared(index, positions, time, self._still)
-            made.append(Frame(positions, self._limit.excess(self._scaled(positions))))
+            made.append(Frame(positions, self._crossings.excess(positions)))
         return made
-
-    def _scaled(self, positions: Floats) -> Floats:
-        scaled = np.ldexp(positions, -self._exponent)
-        return np.asarray(scaled - np.ldexp(self._pair.key0[0], -self._exponent))
 
 
 def _blended(key0: Floats, key1: Floats, time: float) -> Floats:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,13 +19,14 @@ from ..fit.fit_pair import fit_pair
 from ..fit.fitted_map import FittedMap
 from ..fit.storage import from_bytes, to_bytes
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
-from ..settings import FitOptions, FrameOptions
+from ..settings import FitOptions, FrameOptions, PlayOptions
 from ..support.memory import estimated_mb, require_memory
-from ..support.progress import Steps, numbered
+from ..support.progress import Steps, numbered, timed
 from .bake import Bake, checked_times
 from .chain import chain_frames
 from .following import Following
 from .modes import needs_fits
+from .played import Moments, played
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,9 @@ class Task:
         Stored fits, by the names of their keys, that need not be made again.
     collider : Collider, optional
         What the frames must not touch, at each of the keys ``through``.
+    play : PlayOptions, optional
+        Where given, the frames are those that a control needs to play the motion, in place of those at ``times``, and
+        the report says what it plays between them.
     """
 
     pairs: dict[Ends, KeyPair]
@@ -54,6 +59,7 @@ class Task:
     times: Floats = field(default_factory=lambda: np.empty(0))
     kept: dict[Ends, bytes] = field(default_factory=dict)
     collider: Collider | None = None
+    play: PlayOptions | None = None
 
     @classmethod
     def of_keys(
@@ -86,7 +92,17 @@ class Task:
     @property
     def needs_fits(self) -> bool:
         """Whether fits are wanted: for frames of all modes but ``straight``, or for themselves."""
-        return needs_fits(self.frame_options.mode) or not len(self.times)
+        return needs_fits(self.frame_options.mode) or not self.frame_count
+
+    @cached_property
+    def moments(self) -> Moments | None:
+        """The moments that ``play`` needs."""
+        return None if self.play is None else Moments.of(self.play, self.frame_options, len(self.through) - 1)
+
+    @property
+    def frame_count(self) -> int:
+        """How many frames have to be made."""
+        return len(self.times) if self.moments is None else len(self.moments.times)
 
     @property
     def new_fits(self) -> int:
@@ -96,7 +112,7 @@ class Task:
     def require_memory(self, limit_mb: float) -> None:
         """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
         vertices = len(next(iter(self.pairs.values())).key0)
-        needed = estimated_mb(vertices, len(self.pairs), len(self.times), self.fit_options.quality, self.needs_fits)
+        needed = estimated_mb(vertices, len(self.pairs), self.frame_count, self.fit_options.quality, self.needs_fits)
         if limit_mb:
             require_memory(needed, limit_mb, vertices)
 
@@ -125,7 +141,7 @@ def carry_out(task: Task) -> Steps[Outcome]:
     QC3DError
         If a kept fit is damaged or belongs to other keys, a fit cannot be made, or a time is outside 0..1.
     """
-    times = checked_times(task.times)  # before the slow part
+    times = checked_times(task.times if task.moments is None else task.moments.times)  # before the slow part
     following = None
     if task.collider is not None and len(times):
         following = Following(task.collider, times, task.fit_options, task.frame_options)
@@ -149,11 +165,11 @@ def carry_out(task: Task) -> Steps[Outcome]:
     if following is not None:
         collider = yield from numbered(following.posed(), task.new_fits, every)
     along = list(pairwise(task.through))
-    frames = chain_frames(
-        [task.pairs[ends] for ends in along], [fits[ends] for ends in along if ends in fits], times, task.frame_options,
-        collider,
-    )
-    bake = yield from numbered(frames, every, every)
+    pairs, fitted = [task.pairs[ends] for ends in along], [fits[ends] for ends in along if ends in fits]
+    bake = yield from numbered(chain_frames(pairs, fitted, times, task.frame_options, collider), every, every)
     if following is not None:
         bake.report.notes += following.notes
+    if task.play is not None and task.moments is not None:
+        with timed(bake.report.seconds, "played"):
+            bake = played(bake, task.moments, pairs, fitted, task.play, task.frame_options)
     return Outcome(stored, bake)

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import SuperLU
 from ..arrays import Floats, Ints
 from ..maps.representation import polar_decomposition
 from ..numerics.assembly import StiffnessPattern, stiffness_elements
-from ..numerics.nested_dissection import dissection_order, factored
+from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotation_unwrapping import Turning
 from ..numerics.rotations import products
 from ..numerics.symmetric_matrices import Stretch
@@ -50,7 +50,7 @@ class VolumePath:
         self._weights = mesh.volumes * insideness
         elements = stiffness_elements(self._weights, mesh.gradients)
         matrix = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(elements)
-        order = dissection_order(mesh.points, matrix)
+        order = elimination_order(mesh.points, matrix)
 
         def system(coordinate: int) -> tuple[Ints, SuperLU, Floats]:
             held = mesh.on_cube_face[:, coordinate]

@@ -28,6 +28,8 @@ _MOST_GROWTH = 1e10
 _SINGLE_STEP = float(np.finfo(np.float32).eps)
 _ROUNDING_STEPS = 8.0
 _MOST_ROUNDING = 3e-3
+# Where single precision tells positions only this part of a key's size apart, its shape suffers.
+_COARSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +103,12 @@ class KeyPair:
         apart = [(key != key[vertices][group]).any(axis=1) for key in (self.key0, self.key1)]
         return int(np.count_nonzero(apart[0] | apart[1]))
 
+    @cached_property
+    def far_away(self) -> str | None:
+        """A sentence where a key lies so far from its origin that single precision has lost much of its shape."""
+        error = _lost_far_away(self.key0, self.key1)
+        return None if error is None else str(error)
+
 
 def consecutive_pairs(
     shapes: Mapping[str, ArrayLike], faces: ArrayLike, edges: ArrayLike | None, through: Sequence[str]
@@ -131,6 +139,22 @@ def consecutive_pairs(
             with naming_pair(first, second, through):
                 pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges)
     return pairs
+
+
+def _lost_far_away(first: Floats, second: Floats) -> InputError | None:
+    """The error to raise where the cause is a far offset in single precision."""
+    size = max(float(np.ptp(key, axis=0).max()) for key in (first, second))
+    for key, name in ((first, "first"), (second, "second")):
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            single = key.astype(np.float32)
+            step = float(np.spacing(np.abs(single).max()))
+        if step > _COARSE * size > 0.0 and (single == key).all():
+            return InputError(
+                f"The {name} key lies so far from its origin, at {np.abs(key).max():.1e}, that single precision tells "
+                f"positions only {step:.1g} apart there, {step / size:.1%} of its size, and has lost much of its "
+                "shape; model it near the origin and move the object instead."
+            )
+    return None
 
 
 def _positions(key: ArrayLike, name: str) -> Floats:

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Floats
 from ..errors import InputError
+from ..numerics.grouped_sums import sums_by_label
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.geometry import areas
 from ..triangles.topology import sides, unique_edges, vertex_components
@@ -15,27 +18,66 @@ from .keypair import KeyPair
 
 # Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
 _MOST_SHARE = 0.5
-# Volumes below this part of the size cubed are none.
-_LEAST_VOLUME = 1e-9
+# Volumes below this part of the size cubed are none; parts that are as small as the second are named all the same.
+_LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
+# What is turned inside out holds, for its surface, at least this part of the volume that it held before: what crosses
+# itself all over or is flattened holds next to none, on whichever side.
+_AS_FULL = 0.3
 
 
-def require_reachable(pair: KeyPair) -> None:
-    """Check that a motion of the volume can lead from the first key to the second.
+@dataclass(frozen=True)
+class Reversal:
+    """How much of a mesh no motion of a volume carries from the first key to the second.
+
+    Parameters
+    ----------
+    mirrored : float
+        Of the first key's surface, 0..1: closed components that are mirror images or turned inside out.
+    tangled : float
+        The same for closed components that cross themselves so far, or are so flat, that their signed volume has the
+        other sign.
+    parts : int
+        How many components are mirrored.
+    """
+
+    mirrored: float
+    tangled: float
+    parts: int
+
+
+def require_reachable(pair: KeyPair) -> Reversal:
+    """Check that a motion of the volume can lead from the first key to the second; returns what it does not reach.
 
     Raises
     ------
     InputError
-        If more than half of the surface is mirrored or turned inside out: no map that keeps orientation does that.
+        If more than half of the surface is mirrored, turned inside out or tangled: no map that keeps orientation does
+        that.
     """
-    if mirrored_share(pair) > _MOST_SHARE:
+    found = reversal(pair)
+    if found.mirrored + found.tangled <= _MOST_SHARE:
+        return found
+    if pair.far_away is not None:
+        raise InputError(pair.far_away)
+    if found.mirrored >= found.tangled:
         raise InputError(
             "The second key is mirrored or turned inside out: no motion of a volume leads there. Choose the mode "
             "straight, which blends along straight lines, or mirror the second key back."
         )
+    raise InputError(
+        "The second key crosses itself so far, or is so flat, that more of it faces inwards than outwards: no motion "
+        "of a volume leads there. Choose the mode straight, which blends along straight lines, or repair the key."
+    )
 
 
 def mirrored_share(pair: KeyPair) -> float:
-    """The part of the first key's surface, 0..1, whose components are mirrored or turned inside out in the second.
+    """The part of the first key's surface, 0..1, that is mirrored, turned inside out or tangled in the second."""
+    found = reversal(pair)
+    return found.mirrored + found.tangled
+
+
+def reversal(pair: KeyPair) -> Reversal:
+    """What is mirrored, turned inside out or tangled between the keys.
 
     Told by the sign of the volume that a closed component encloses. What is open has no inside that could be turned
     out: a leaf may bend to its mirror image.
@@ -45,11 +87,17 @@ def mirrored_share(pair: KeyPair) -> float:
     faces = group[pair.faces]
     labels = vertex_components(unique_edges(sides(faces)), len(vertices))
     closed = ClosedComponents(faces, labels)
-    first, second = (np.where(np.abs(found) > _LEAST_VOLUME, found, 0.0) for found in map(closed.volumes, keys))
-    mirrored = first * second < 0.0
-    surface = areas(keys[0], faces)
-    total = float(surface.sum())
-    return float(surface[mirrored[labels[faces[:, 0]]]].sum()) / total if total > 0.0 else 0.0
+    volumes = np.stack([closed.volumes(key) for key in keys])
+    count = volumes.shape[1]
+    flips, least = volumes[0] * volumes[1] < 0.0, np.abs(volumes).min(axis=0)
+    surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
+    full = np.abs(volumes) / np.maximum(surface, 1e-100) ** 1.5
+    is_real = full[1] > _AS_FULL * full[0]
+    is_reversed = flips & (least > _LEAST_VOLUME)
+    is_part = flips & (least > _LEAST_OF_A_PART)
+    total = max(float(surface[0].sum()), 1e-300)
+    mirrored, tangled = (float(surface[0] @ (is_reversed & chosen)) / total for chosen in (is_real, ~is_real))
+    return Reversal(mirrored, tangled, int((is_part & is_real).sum()))
 
 
 def _in_unit_size(key: Floats) -> Floats:

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files.npz import open_archive, read_array, replacing, require_file
+from ..files.atomic import replacing
+from ..files.npz import open_archive, read_array, require_file, write_arrays
 from ..tets.mesh import TetMesh
 from .mapping import Mapping, checked_mesh
 
@@ -112,7 +113,7 @@ def read_tets(path: Path) -> TetFile:
 
 
 def write_tets(path: Path, content: TetFile) -> None:
-    """Write a mesh with its values; the format follows the ending.
+    """Write a mesh with its values, whole or not at all; the format follows the ending.
 
     Formats without values, such as .mesh, get the mesh with its vertices at their images.
 
@@ -122,23 +123,32 @@ def write_tets(path: Path, content: TetFile) -> None:
         If the file cannot be written, or the ending is unknown.
     """
     with replacing(path) as unfinished:
-        if path.suffix.lower() == ".npz":
-            try:
-                with unfinished.open("wb") as file:
-                    arrays: dict[str, Any] = {**content.at_vertices, **content.at_tets}
-                    np.savez_compressed(file, points=content.points, tets=content.tets, **arrays)
-            except OSError as error:
-                raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
-            return
-        meshio = _meshio()
-        if path.suffix.lower() in _BARE:
-            found = meshio.Mesh(content.at_vertices.get(TARGET, content.points), [("tetra", content.tets)])
-        else:
-            pad = _padded if _format(path) == "gmsh" else np.asarray
-            at_tets = {name: [pad(values)] for name, values in content.at_tets.items()}
-            found = meshio.Mesh(content.points, [("tetra", content.tets)], content.at_vertices, at_tets)
-        with _meshio_errors(path, "written"):
-            found.write(unfinished, _format(path))
+        put_tets(unfinished, content, path)
+
+
+def put_tets(new: Path, content: TetFile, path: Path) -> None:
+    """As ``write_tets``, straight into the file ``new``, which errors call ``path``.
+
+    Raises
+    ------
+    InputError
+        If the ending is unknown, or the format has no room for such values.
+    OSError
+        If the file cannot be written.
+    """
+    if path.suffix.lower() == ".npz":
+        mesh = {"points": content.points, "tets": content.tets}
+        write_arrays(new, {**mesh, **content.at_vertices, **content.at_tets})
+        return
+    meshio = _meshio()
+    if path.suffix.lower() in _BARE:
+        found = meshio.Mesh(content.at_vertices.get(TARGET, content.points), [("tetra", content.tets)])
+    else:
+        pad = _padded if _format(path) == "gmsh" else np.asarray
+        at_tets = {name: [pad(values)] for name, values in content.at_tets.items()}
+        found = meshio.Mesh(content.points, [("tetra", content.tets)], content.at_vertices, at_tets)
+    with _meshio_errors(path, "written"):
+        found.write(new, _format(path))
 
 
 def _format(path: Path) -> str | None:
@@ -174,6 +184,8 @@ def _meshio_errors(path: Path, done: str) -> Iterator[None]:
         with redirect_stdout(said), redirect_stderr(said):
             yield
     except (Exception, SystemExit) as error:
+        if isinstance(error, OSError) and done == "written":
+            raise
         reason = " ".join(str(error).split()) if not isinstance(error, SystemExit) else "not a format meshio knows"
         remedy = "export it again, or name another file" if done == "read" else "choose another format or place"
         reason = reason.rstrip(".") or type(error).__name__

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Bools, Floats, Ints
 from ..settings import Quality
 from ..triangles.geometry import areas
+from ..triangles.topology import without_piles
 
 SizeField = Callable[[Floats], Floats]
 
@@ -108,6 +109,7 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
         samples = np.einsum("nk,nka->na", weights, corners[triangle])
         samples = samples[thin(samples, np.full(count, spacing))]
     vertices = rng.permutation(points)
+    vertices = vertices[without_piles(vertices, _NEIGHBOURS)]
     apart: Floats = vertices[thin(vertices, np.full(len(vertices), spacing), samples)]
     return np.concatenate([samples, apart])
 

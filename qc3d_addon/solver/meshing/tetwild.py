@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..errors import MeshingError
+from ..errors import MeshingError, with_remedy
+from ..files.private_folders import PrivateFolder, temporary_place
 from ..numerics.grouped_sums import means_by_label
-from ..support.private_folders import PrivateFolder
+from ..support.guarded_program import Ending, Guardian
 from ..tets.mesh import TetMesh
 from .poisson_disk import RESOLUTIONS, Resolution, sample_cube, sample_surface
 from .slivers import triangulate
@@ -112,48 +111,29 @@ def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floa
     reason = unavailable_reason()
     if reason is not None:
         raise MeshingError(f"The meshing engine tetwild cannot run here: {reason}.")
-    with PrivateFolder() as folder:
-        for key, array in arrays.items():
-            np.save(folder / f"{key}.npy", array, allow_pickle=False)
-        command = [*load_command(), str(folder), str(time_limit)]
-        status, message = _run(command, folder / "errors.txt", time_limit)
-        if status is None:
-            raise MeshingError(
-                f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
-                "allow it more, or choose a lower quality or the engine delaunay."
-            )
-        output = folder / "output.npz"
-        if status != 0 or not output.exists():
-            how = f" with an error: {message}." if message else f" without a mesh (exit status {status})."
-            raise MeshingError(f"The meshing engine tetwild ended{how}")
-        try:
-            with np.load(output, allow_pickle=False) as archive:
+    try:
+        with PrivateFolder() as folder, Guardian(folder) as guardian:
+            for key, array in arrays.items():
+                np.save(folder / f"{key}.npy", array, allow_pickle=False)
+            ending = guardian.run([*load_command(), str(folder), str(time_limit)], time_limit)
+            _require_success(ending, folder / "output.npz", time_limit)
+            with np.load(folder / "output.npz", allow_pickle=False) as archive:
                 return archive["points"].astype(np.float64), archive["tets"].astype(np.int64)
-        except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
-            raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
+    except (ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise MeshingError(f"The result of the meshing engine tetwild cannot be read: {error}") from error
+    except OSError as error:
+        raise MeshingError(
+            f"The meshing engine tetwild cannot work with temporary files in {temporary_place()}: "
+            f"{with_remedy(error)}."
+        ) from error
 
 
-def _run(command: list[str], errors: Path, time_limit: float) -> tuple[int | None, str]:
-    """Exit status (None: killed at the time limit) and the last line written to standard error."""
-    # In the group of whoever waits for it: what ends that group, such as Ctrl-C or a cancelled bake, ends this too.
-    flags = 0
-    if sys.platform == "win32":
-        flags = subprocess.CREATE_NO_WINDOW
-    with open(errors, "wb") as stream:
-        process = subprocess.Popen(
-            command,
-            cwd=errors.parent,  # fTetWild writes files of its own where it runs
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=stream,
-            creationflags=flags,
+def _require_success(ending: Ending, output: Path, time_limit: float) -> None:
+    if ending.status is None:
+        raise MeshingError(
+            f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
+            "allow it more, or choose a lower quality or the engine delaunay."
         )
-        try:
-            status = process.wait(time_limit)
-        except subprocess.TimeoutExpired:
-            status = None
-        finally:  # also when the user interrupts the wait
-            process.kill()
-            process.wait()
-    lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return status, lines[-1] if lines else ""
+    if ending.status != 0 or not output.exists():
+        how = f" with an error: {ending.words}." if ending.words else f" without a mesh (exit status {ending.status})."
+        raise MeshingError(f"The meshing engine tetwild ended{how}")

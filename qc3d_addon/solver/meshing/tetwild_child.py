@@ -20,6 +20,7 @@ import math
 import os
 import signal
 import sys
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 
@@ -57,8 +58,11 @@ def main(arguments: list[str]) -> None:
         arrays["size_tets"].astype(np.int32),
         arrays["size_values"],
     )
+    # Not straight into the file: what is left of an archive that could not be written says more than why.
+    archive = BytesIO()
+    np.savez(archive, points=points, tets=tets)
     # Renamed when complete: a crash while writing must not look like a result.
-    np.savez(folder / "unfinished.npz", points=points, tets=tets)
+    (folder / "unfinished.npz").write_bytes(archive.getvalue())
     os.replace(folder / "unfinished.npz", folder / "output.npz")
 
 

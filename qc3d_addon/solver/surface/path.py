@@ -39,7 +39,6 @@ SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
 _TRIANGLES_AT_ONCE = 150_000
-_LEAST_VOLUME = 1e-12
 
 
 class SurfacePath:
@@ -147,12 +146,6 @@ class SurfacePath:
     def shapes_at_once(self) -> int:
         """For how many times it pays to solve together: a few where that spares calls and passes of the factors."""
         return max(1, min(_MOST_AT_ONCE, _TRIANGLES_AT_ONCE // max(1, len(self._surface.rows))))
-
-    @property
-    def inside_out(self) -> int:
-        """How many closed components are mirrored or turned inside out between the keys: no motion of a volume does."""
-        first, second = (np.where(np.abs(volume) > _LEAST_VOLUME, volume, 0.0) for volume in self._volumes)
-        return int(np.count_nonzero(first * second < 0.0))
 
     def positions(self, time: float, anchor: Floats | None = None, sweeps: int = SWEEPS) -> Floats:
         """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.

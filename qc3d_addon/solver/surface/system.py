@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Bools, Floats, Ints
 from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_elements
-from ..numerics.nested_dissection import dissection_order, factored
+from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotations import by_component
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.deformation import TriangleDeformation
@@ -68,7 +68,7 @@ class MovingSurface:
             + StiffnessPattern(edges, count).assemble(spring)
         )
         moving = np.flatnonzero(free)
-        moving = moving[dissection_order(points[moving], csr_array(stiffness[moving][:, moving]))]
+        moving = moving[elimination_order(points[moving], csr_array(stiffness[moving][:, moving]))]
         touched = closed.faces[free[closed.faces].any(axis=1)]
         beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
         beside = beside[~free[beside]]

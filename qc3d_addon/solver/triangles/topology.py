@@ -66,6 +66,19 @@ def _joined_groups(both: Floats, reach: tuple[float, float], edges: Ints | None)
     return labels
 
 
+def without_piles(points: Floats, most: int) -> Ints:
+    """(k,) which points (n, 3) to keep, ascending: all, or, where more than ``most`` are in one place, one of each.
+
+    Trees of points look at all that are in one place one by one, for every question.
+    """
+    along = np.sort(points[:, 0] + points[:, 1] * np.sqrt(2.0) + points[:, 2] * np.sqrt(3.0))
+    if len(along) <= most or not (along[most:] == along[:-most]).any():
+        return np.arange(len(points))
+    _, first, counts = np.unique(points, axis=0, return_index=True, return_counts=True)
+    kept: Ints = np.sort(first) if counts.max() > most else np.arange(len(points))
+    return kept
+
+
 def sides(faces: Ints) -> Ints:
     """(3m, 2) the three edges of every triangle, smaller index first; edge k*m + j belongs to face j."""
     return np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
@@ -74,7 +87,10 @@ def sides(faces: Ints) -> Ints:
 def distinct(numbers: Ints) -> Ints:
     """(k,) the numbers (n,) without repetition, sorted; many times faster than numpy's hashing from version 2.3 on."""
     ordered = np.sort(numbers)
-    return ordered[np.diff(ordered, prepend=ordered[:1] - 1) > 0]
+    first = np.ones(len(ordered), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
+    kept: Ints = ordered[first]
+    return kept
 
 
 def among(numbers: Ints, known: Ints) -> Bools:

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
 from qc3d_addon.solver.collision import box_tree
-from qc3d_addon.solver.collision.box_tree import TriangleTree
+from qc3d_addon.solver.collision.box_tree import Budget, CrowdedError, TriangleTree
 
 from ..meshes import icosphere
 
 
 def found(tree: TriangleTree, points: Floats, faces: Ints) -> list[tuple[int, int]]:
     corners = points.T[:, faces[tree.order]]
-    chunks = list(tree.meeting(corners.min(axis=2), corners.max(axis=2)))
+    chunks = list(tree.meeting(corners.min(axis=2), corners.max(axis=2), Budget(len(faces))))
     pairs = [np.sort(tree.order[np.stack(chunk)], axis=0) for chunk in chunks]
     return sorted(map(tuple, np.concatenate(pairs, axis=1).T.tolist()))
 
@@ -58,21 +58,64 @@ def test_a_sphere_that_is_crumpled() -> None:
         assert found(tree, shape, faces) == sorted(without_neighbours(compared(shape, faces, moving), faces))
 
 
-def test_a_fan_too_large_to_list_is_met_on_the_way() -> None:
+def test_no_two_triangles_of_a_fan_too_large_to_list_are_compared() -> None:
     count = box_tree._MOST_AROUND_A_VERTEX + 9
     angles = 2.0 * np.pi * np.arange(count) / count
     points = np.concatenate([np.zeros((1, 3)), np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)])
     rim = np.arange(count)
     faces = np.stack([np.zeros(count, dtype=np.int64), 1 + rim, 1 + (rim + 1) % count], axis=1)
-    moving = np.ones(count, dtype=bool)
-    pairs = set(found(TriangleTree(faces, [points], moving), points, faces))
-    expected = compared(points, faces, moving)
-    assert pairs <= expected
-    # Pairs along the rim may be listed as neighbours; the others share only the hub.
-    neighbours = {tuple(sorted((one, (one + 1) % count))) for one in range(count)}
-    assert expected - pairs <= neighbours
+    points = np.concatenate([points, icosphere(1)[0] - 0.5])
+    ball = icosphere(1)[1] + 1 + count
+    both, all_move = np.concatenate([faces, ball]), np.ones(count + len(ball), dtype=bool)
+    pairs = found(TriangleTree(both, [points], all_move), points, both)
+    expected = without_neighbours(compared(points, both, all_move), both)
+    # All share the hub: only pairs of the ball, and of the ball and the fan, are left.
+    assert pairs == sorted(expected)
+    assert any(one < count <= other for one, other in pairs)
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(2, 70), st.integers(1, 5))
+def test_pairs_of_one_group_are_left_out(seed: int, count: int, groups: int) -> None:
+    random = np.random.default_rng(seed)
+    points, faces = random.normal(size=(3 * count, 3)), np.arange(3 * count).reshape(-1, 3)
+    moving, labels = random.random(count) < 0.8, random.integers(-1, groups, size=count)
+    everything = compared(points, faces, moving)
+    expected = sorted((a, b) for a, b in everything if labels[a] != labels[b] or labels[a] < 0)
+    assert found(TriangleTree(faces, [points], moving, labels), points, faces) == expected
+
+
+class TestWork:
+    """Counted, not timed: ordinary meshes stay far below what is too much, whatever the triangles are like."""
+
+    @staticmethod
+    def spent(points: Floats, faces: Ints) -> float:
+        budget = Budget(len(faces))
+        before = budget.left
+        corners = points.T[:, faces[(tree := TriangleTree(faces, [points], np.ones(len(faces), dtype=bool))).order]]
+        for _ in tree.meeting(corners.min(axis=2), corners.max(axis=2), budget):
+            pass
+        return (before - budget.left) / len(faces)
+
+    def test_an_ordinary_mesh(self) -> None:
+        assert self.spent(*icosphere(4)) < 20.0
+
+    def test_a_vertex_of_ten_thousand_triangles(self) -> None:
+        count = 10_000
+        angles = 2.0 * np.pi * np.arange(count) / count
+        rim = np.arange(count)
+        points = np.concatenate([[[0.1, 0.2, 1.5]], np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)])
+        assert self.spent(points, np.stack([0 * rim, 1 + rim, 1 + (rim + 1) % count], axis=1)) < 20.0
+
+    def test_more_than_allowed_is_given_up(self) -> None:
+        count = 300
+        points = np.random.default_rng(0).normal(size=(3 * count, 3))
+        faces = np.arange(3 * count).reshape(-1, 3)
+        tree = TriangleTree(faces, [points], np.ones(count, dtype=bool))
+        corners = points.T[:, faces]
+        budget = Budget(count)
+        budget.left = 1000
+        with pytest.raises(CrowdedError, match=r"lie over each other .* remove triangles that are there many times"):
+            list(tree.meeting(corners.min(axis=2), corners.max(axis=2), budget))
 @pytest.mark.parametrize("chunk", [1, 5, 40])
 def test_chunks_give_the_same(chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(8)

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.collision import box_tree
-from qc3d_addon.solver.collision.crossings import crossing_pairs
+from qc3d_addon.solver.collision.box_tree import CrowdedError
+from qc3d_addon.solver.collision.crossings import CrossingSearch, crossing_pairs
+from qc3d_addon.solver.collision.self_crossings import CrossingLimit
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 
 from ..meshes import icosphere
@@ -55,7 +57,8 @@ def tried_one_by_one(points: Floats, faces: Ints) -> list[list[int]]:
     exact = [tuple(Fraction(value) for value in point) for point in points.tolist()]
     corners = [[exact[vertex] for vertex in face] for face in faces.tolist()]
     found = []
-    for (first, one), (second, other) in combinations(enumerate(corners), 2):
+    _, listed = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)  # one that comes again counts once
+    for (first, one), (second, other) in combinations([(row, corners[row]) for row in sorted(listed.tolist())], 2):
         if set(faces[first].tolist()) & set(faces[second].tolist()):
             continue
         if any(
@@ -188,6 +191,36 @@ def test_triangles_without_any_size() -> None:
     points = np.random.default_rng(0).normal(size=(50, 3))
     assert not len(crossing_pairs(points, np.repeat(np.arange(50), 3).reshape(-1, 3)))
     assert not len(crossing_pairs(np.zeros((6, 3)), triangles(2)))
+
+
+def test_a_triangle_that_is_listed_again_counts_once() -> None:
+    points, faces = np.concatenate([FLAT, [[1, 1, -1], [1, 1, 1], [5, 5, 1]]]), triangles(2)
+    again = np.concatenate([faces, np.repeat(np.roll(faces[:1], 1, axis=1), 20_000, axis=0), faces[::-1]])
+    assert crossing_pairs(points, again).tolist() == [[0, 1]]
+    moving = np.zeros(len(again), dtype=bool)
+    assert not len(crossing_pairs(points, again, moving))
+    moving[0] = True
+    assert crossing_pairs(points, again, moving).tolist() == [[0, 1]]
+
+
+def test_the_triangles_of_a_part_that_is_a_point_cross_nothing() -> None:
+    points, faces = icosphere(3)
+    together = np.concatenate([points, np.tile(points.mean(axis=0), (len(points), 1))])
+    search = CrossingSearch(np.concatenate([faces, faces + len(points)]), [together])
+    assert not len(search.pairs(together))
+
+
+def test_a_search_that_would_take_too_long_is_given_up() -> None:
+    points, faces = icosphere(2)
+    copies = 12_000
+    jitter = 1e-3 * np.random.default_rng(2).normal(size=(3 * copies, 3))
+    crowded = np.concatenate([points, np.tile(points[faces[0]], (copies, 1)) + jitter])
+    together = np.concatenate([faces, len(points) + triangles(copies)])
+    with pytest.raises(CrowdedError, match="looking for crossings would take too long"):
+        crossing_pairs(crowded, together)
+    limit = CrossingLimit(together, crowded, 1.1 * crowded, np.zeros(len(crowded), dtype=bool))
+    assert limit.excess(crowded) is None
+    assert not limit.new_vertices(crowded).any()
 
 
 def test_one_huge_triangle_over_thousands_of_tiny_ones() -> None:

@@ -18,7 +18,6 @@ from numpy.lib import format as npy
 from qc3d_addon.cli.reconstruct import read_landmarks
 from qc3d_addon.solver.compression.files import Source, read_compressed
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.files.npz import replacing_all
 from qc3d_addon.solver.fit.files import read_maps
 from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.maps.files import read_tets
@@ -145,55 +144,3 @@ def save(path: Path, name: str, content: bytes) -> None:
     with zipfile.ZipFile(buffer) as whole, zipfile.ZipFile(path, "w") as archive:
         for entry in whole.namelist():
             archive.writestr(entry, content if entry == name else whole.read(entry))
-
-
-class TestSeveralFiles:
-    @pytest.fixture
-    def paths(self, tmp_path: Path) -> list[Path]:
-        paths = [tmp_path / name for name in ("one.txt", "two.txt", "three.txt")]
-        paths[0].write_text("earlier one")
-        paths[2].write_text("earlier three")
-        return paths
-
-    @staticmethod
-    def contents(folder: Path) -> dict[str, str]:
-        return {path.name: path.read_text() for path in folder.iterdir()}
-
-    def test_all_take_their_places(self, paths: list[Path], tmp_path: Path) -> None:
-        with replacing_all(*paths) as new:
-            for path in new:
-                path.write_text("new")
-        assert self.contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "three.txt": "new"}
-
-    @pytest.mark.parametrize("failing", [0, 1, 2])
-    @pytest.mark.parametrize("error", [OSError(5, "Input/output error"), KeyboardInterrupt()])
-    def test_or_none_does(
-        self,
-        paths: list[Path],
-        tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        failing: int,
-        error: BaseException,
-    ) -> None:
-        before, replace = self.contents(tmp_path), Path.replace
-
-        def sometimes(self: Path, target: Path) -> Path:
-            if ".part" in self.name and target.name == paths[failing].name:
-                raise error
-            return replace(self, target)
-
-        expected = InputError if isinstance(error, OSError) else KeyboardInterrupt
-        monkeypatch.setattr(Path, "replace", sometimes)
-        with pytest.raises(expected), replacing_all(*paths) as new:  # noqa: PT012
-            for path in new:
-                path.write_text("new")
-        assert self.contents(tmp_path) == before
-
-    def test_where_there_are_no_links_files_are_copied(
-        self, paths: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        def no_links(*_: object) -> None:
-            raise OSError(1, "Operation not permitted")
-
-        monkeypatch.setattr(os, "link", no_links)
-        self.test_or_none_does(paths, tmp_path, monkeypatch, 2, KeyboardInterrupt())

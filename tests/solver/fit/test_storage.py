@@ -19,7 +19,7 @@ from numpy.lib import format as npy
 
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.fit.fitted_map import FittedMap
-from qc3d_addon.solver.fit.storage import fingerprint, from_bytes, to_bytes
+from qc3d_addon.solver.fit.storage import FORMAT_VERSION, fingerprint, from_bytes, to_bytes, why_unusable
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import FitOptions
 
@@ -173,6 +173,31 @@ class TestWrongContents:
     def test_another_version(self) -> None:
         header = {**contents(STORED)["header"], "version": 99}
         self.refused("has format 99, this version reads 2; fit the keys", header=header)
+
+    @pytest.mark.parametrize(
+        ("version", "said"),
+        [
+            (FORMAT_VERSION, None),
+            (FORMAT_VERSION - 1, "was stored by an earlier version of QC3D"),
+            (FORMAT_VERSION + 1, "was stored by a later version of QC3D"),
+            ("1", "is damaged"),
+            (None, "is damaged"),
+            ([1], "is damaged"),
+        ],
+    )
+    def test_what_is_said_of_a_version_without_unpacking(self, version: object, said: str | None) -> None:
+        changed = contents(STORED)
+        changed["header"]["version"] = version
+        assert why_unusable(sealed(changed)) == said
+
+    @pytest.mark.parametrize("data", [b"", STORED[:-1], STORED[:SEAL], STORED[:-1] + b"x", b"x" * 100])
+    def test_what_is_said_of_damage(self, data: bytes) -> None:
+        assert why_unusable(data) == "is damaged"
+
+    @pytest.mark.parametrize("header", [b"", b"{", b"[]", b"7", b"[" * 100_000, b"\xff"])
+    def test_what_is_said_of_a_header_that_is_none(self, header: bytes) -> None:
+        changed = {**contents(STORED), "header": np.frombuffer(header, dtype=np.uint8)}
+        assert why_unusable(sealed(changed)) == "is damaged"
 
     @pytest.mark.parametrize("name", ["header", "points", "tets", "maps", "turns"])
     def test_a_part_is_missing(self, name: str) -> None:

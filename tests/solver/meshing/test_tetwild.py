@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -74,6 +76,8 @@ def test_arrays_go_there_and_back(stand_in: Path) -> None:
         ("os.abort()", "without a mesh"),
         ("raise ValueError('no such mesh')", "ValueError: no such mesh"),
         ("sys.exit('out of cheese')", "out of cheese"),
+        ("sys.stderr.write('x' * 10**6); sys.exit(1)", "with an error: x{300}\\."),
+        ("raise OSError(28, 'No space left on device')", "No space left on device"),
         ("open(folder + '/unfinished.npz', 'wb').write(b'half a resu')", "without a mesh"),
         ("open(folder + '/output.npz', 'wb').write(b'not an archive')", "cannot be read"),
     ],
@@ -102,20 +106,23 @@ def test_the_time_limit_ends_the_child(stand_in: Path, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for the child's process in /proc")
 def test_an_interrupt_ends_the_child(stand_in: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    play(stand_in, "time.sleep(600)")
-    started: list[subprocess.Popen[bytes]] = []
+    own = tmp_path / "pid"
+    play(stand_in, f"open({str(own)!r}, 'w').write(f'{{os.getpid()}}.')", "time.sleep(600)")
 
-    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
-        def wait(self, timeout: float | None = None) -> int:
-            if not started:
-                started.append(self)
-                raise KeyboardInterrupt
-            return super().wait(timeout)
+    def interrupt() -> None:
+        while not (own.exists() and own.read_text().endswith(".")):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(tetwild.subprocess, "Popen", Interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        tetwild.run_child(ARRAYS, 20.0)
-    assert ended(started[0].pid)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Thread(target=interrupt, daemon=True).start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            tetwild.run_child(ARRAYS, 20.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended(int(own.read_text()[:-1]))
+    assert not list((tmp_path / "temporary").iterdir())
 
 
 def test_a_missing_package_is_an_error_and_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from qc3d_addon.solver.arrays import Floats
-from qc3d_addon.solver.numerics.nested_dissection import dissection_order, factored
+from qc3d_addon.solver.numerics.nested_dissection import elimination_order, factored
 
 
 def grid(side: int) -> tuple[Floats, csr_array]:
@@ -27,13 +27,13 @@ def test_every_unknown_comes_once_wherever_it_is(seed: int, count: int, same_pla
     random = np.random.default_rng(seed)
     points = random.normal(size=(count, 3)) * (0.0 if same_place else 1.0)
     ties = csr_array(random.random((count, count)) < 0.05, dtype=np.float64)
-    order = dissection_order(points, csr_array(ties + ties.T))
+    order = elimination_order(points, csr_array(ties + ties.T))
     np.testing.assert_array_equal(np.sort(order), np.arange(count))
 
 
 def test_factors_are_smaller_than_in_the_given_order() -> None:
     points, matrix = grid(60)
-    order = dissection_order(points, matrix)
+    order = elimination_order(points, matrix)
     mixed = np.random.default_rng(0).permutation(len(points))
     entries = [factored(csr_array(matrix[rows][:, rows])).L.nnz for rows in (order, np.arange(len(points)), mixed)]
     assert entries[0] < 0.5 * entries[1] < entries[2]
@@ -43,7 +43,7 @@ def test_growth_is_close_to_linear() -> None:
     entries = []
     for side in (32, 64):
         points, matrix = grid(side)
-        order = dissection_order(points, matrix)
+        order = elimination_order(points, matrix)
         entries.append(factored(csr_array(matrix[order][:, order])).L.nnz)
     # Nested dissection has n log n entries: four times the unknowns, less than six times the entries.
     assert entries[1] < 6 * entries[0]
@@ -52,7 +52,7 @@ def test_growth_is_close_to_linear() -> None:
 @pytest.mark.parametrize("side", [1, 2, 20])
 def test_solutions(side: int) -> None:
     points, matrix = grid(side)
-    order = dissection_order(points, matrix)
+    order = elimination_order(points, matrix)
     exact = np.random.default_rng(side).normal(size=(side * side, 2))
     solved = np.empty_like(exact)
     solved[order] = factored(csr_array(matrix[order][:, order])).solve((matrix @ exact)[order])

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is kept beside the shape keys of a chain: its entry in the record, its measures, its maps."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from itertools import pairwise
+
+import bpy
+
+from ..heat_map import heat_map
+from ..store import id_properties, kept_measures
+from ..store.kept_measures import Measures
+from ..store.records import PROPERTY, Chain, Record
+
+
+def remember(obj: bpy.types.Object, record: Record, chain: Chain, measures: Measures | None, undo: ExitStack) -> None:
+    """Keep the record, and the measures of the chain whose keys were written; show them where its heat map is shown."""
+    keys = obj.data.shape_keys
+    if measures:
+        kept_measures.keep(keys, chain.slider, measures, undo)
+    else:
+        kept_measures.forget(keys, chain.slider, undo)
+    record.write(keys, undo)
+    heat_map.refresh(obj, chain)
+
+
+def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -> None:
+    """Forget a chain: its entry in the record, its measures, and the maps that no other chain needs."""
+    kept_measures.forget(keys, chain.slider, undo)
+    record.chains.remove(chain)
+    needed = {ends for other in record.chains for ends in pairwise(other.through)}
+    for kept in [kept for kept in record.maps if (kept.from_key, kept.to_key) in set(pairwise(chain.through)) - needed]:
+        record.maps.remove(kept)
+        id_properties.remove(keys, kept.property_name, undo)
+    if record.chains or record.maps:
+        record.write(keys, undo)
+    else:
+        id_properties.remove(keys, PROPERTY, undo)
+
+
+def forget_all(obj: bpy.types.Object) -> None:
+    """Forget all that is kept with the keys of ``obj``, sound or not, and hide its heat map; keys and sliders stay."""
+    keys = obj.data.shape_keys
+    heat_map.hide(obj)
+    with ExitStack() as undo:
+        for name in [name for name in keys.keys() if name == PROPERTY or name.startswith(f"{PROPERTY}_")]:  # noqa: SIM118
+            id_properties.remove(keys, name, undo)
+        undo.pop_all()

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that lets go of a record of earlier bakes that cannot be read."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..bake import bookkeeping
+from ..store import records
+from .common import poll_active_object
+
+
+class QC3D_OT_forget_record(bpy.types.Operator):
+    """Forget the damaged record, so that you can bake anew; shape keys and sliders of earlier bakes stay as they are"""
+
+    bl_idname = "qc3d.forget_record"
+    bl_label = "Forget Damaged Record"
+    bl_options = {'UNDO'}  # noqa: RUF012 - Blender reads it from the class
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not poll_active_object(cls, context):
+            return False
+        is_damaged = records.state(context.active_object.data.shape_keys).is_damaged
+        if not is_damaged:
+            cls.poll_message_set("The record of earlier bakes is not damaged.")
+        return is_damaged
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        bookkeeping.forget_all(context.active_object)
+        self.report({'INFO'}, "The record is gone; the keys and sliders of earlier bakes are yours now.")
+        return {'FINISHED'}

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the command says. That nobody can hear it any more is no reason to end the work."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TextIO
+
+_unheard: OSError | None = None
+
+
+def open_streams() -> None:
+    """Open what is closed of standard input, output and error, so that no file of ours gets one of their numbers.
+
+    What native code writes to standard output or error would end up in that file.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest number that is free, which is this one: those below it are open.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+        if getattr(sys, name) is None:
+            mode = "r" if name == "stdin" else "w"
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - as long as the process lives
+
+
+def say(text: str) -> None:
+    """Write a line to standard output."""
+    with _listening():
+        print(text, flush=True)
+
+
+def note(text: str) -> None:
+    """Write a sentence to standard error."""
+    try:
+        print(f"qc3d: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        _silence(sys.stderr)
+
+
+def flush() -> None:
+    """Write what is left for standard output, of others too."""
+    with _listening():
+        sys.stdout.flush()
+
+
+def take_unheard() -> OSError | None:
+    """Why something that was said could not be written, or None; asked once."""
+    global _unheard
+    error, _unheard = _unheard, None
+    return error
+
+
+@contextmanager
+def _listening() -> Iterator[None]:
+    global _unheard
+    try:
+        yield
+    except OSError as error:
+        _unheard = _unheard or error
+        _silence(sys.stdout)
+
+
+def _silence(stream: TextIO) -> None:
+    """Let nothing more come of a stream, such as the same error when Python ends."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make the file ``files/baked_VERSION.blend`` of the Blender that runs this: every kind of thing that a bake leaves.
+
+    python -m tests.blender.attacks.make_baked_files
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+import qc3d_addon
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.solver.fit import fit_pair
+from qc3d_addon.solver.settings import FrameOptions
+
+from ..conftest import six_tetrahedra
+
+FILES = Path(__file__).with_name("files")
+
+
+def main() -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    qc3d_addon.register()
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6)
+    obj = bpy.context.active_object
+    obj.name = obj.data.name = "Figure"
+    rest = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", rest)
+    rest = rest.reshape(-1, 3)
+    leant = rest + np.maximum(rest[:, 2:], 0.0) ** 2 * np.float32([0.5, 0.0, 0.0])
+    for name, shape in (("Basis", rest), ("Lean.L", leant), ("Long", rest * np.float32([1.0, 1.0, 1.5]))):
+        key = obj.shape_key_add(name=name, from_mix=False)
+        key.value = 0.0
+        key.points.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
+    fit_pair.fill_cube = lambda *_: six_tetrahedra()  # so that the maps are small
+    options = FrameOptions(mode="linear")
+    bake_object(obj, BakeRequest(("Basis", "Lean.L"), 3, frame_options=options, keyframes=(1, 25)))
+    bake_object(obj, BakeRequest(("Lean.L", "Basis", "Long"), 2, frame_options=options))
+    for operator in (bpy.ops.qc3d.mirror, bpy.ops.qc3d.heat_map, bpy.ops.qc3d.absolute_keys):
+        assert operator(slider="Basis→Lean.L") == {'FINISHED'}
+    version = ".".join(map(str, bpy.app.version[:2]))
+    FILES.mkdir(exist_ok=True)
+    path = FILES / f"baked_{version}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
+    print(path, path.stat().st_size)
+
+
+if __name__ == "__main__":
+    main()

@@ -272,14 +272,16 @@ class TestPanel:
         (("Basis", "Lean", "", "Stretch"), "Choose inner key 2."),
         (("Basis", "Lean", "Grin"), "There is no shape key 'Grin'; choose the last key from those of the mesh."),
         (("Basis", "Lean", "Lean"), "'Lean' comes twice in a row; choose different keys one after the other."),
-        (("Basis", "Flat", "Lean"), "From 'Basis' to 'Flat': All vertices of the second key lie in one plane"),
+        (("Basis", "Broken", "Lean"), "From 'Basis' to 'Broken': Vertex 3 of the second key has"),
     ],
 )
 def test_keys_that_are_no_chain(
     figure: bpy.types.Object, quick_map: list[FitOptions], state: State, names: tuple[str, ...], said: str
 ) -> None:
-    flat = figure.shape_key_add(name="Flat", from_mix=False)
-    flat.points.foreach_set("co", np.zeros(3 * len(flat.points), dtype=np.float32))
+    broken = figure.shape_key_add(name="Broken", from_mix=False)
+    values = np.zeros(3 * len(broken.points), dtype=np.float32)
+    values[10] = np.nan
+    broken.points.foreach_set("co", values)
     before = state()
     with pytest.raises(RuntimeError) as caught:
         bake(*names)

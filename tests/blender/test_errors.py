@@ -173,28 +173,40 @@ def test_coordinates_that_are_not_finite(
     assert state() == before
 
 
-@pytest.mark.parametrize(
-    ("corners", "said"),
-    [
-        ([], "at least 4 are needed"),
-        ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], "at least 4 are needed"),
-        ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], "in one plane, line or point"),
-        ([(1, 2, 3)] * 5, "in one plane, line or point"),
-    ],
-)
-def test_meshes_that_span_no_volume(
-    operator: Callable[..., Any], state: State, corners: list[tuple[int, int, int]], said: str
-) -> None:
+def object_of(corners: list[tuple[int, int, int]]) -> bpy.types.Object:
+    """An active object with these vertices and two equal shape keys."""
     mesh = bpy.data.meshes.new("Flat")
-    mesh.from_pydata(corners, [], [])
+    mesh.from_pydata(corners, [], [tuple(range(len(corners)))] if len(corners) > 2 else [])
     obj = bpy.data.objects.new("Flat", mesh)
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Lean", from_mix=False)
+    return obj
+
+
+def test_a_mesh_without_vertices(operator: Callable[..., Any], state: State) -> None:
+    object_of([])
     before = state()
-    assert said in refused(operator)
+    assert "The mesh has no vertices" in refused(operator)
     assert state() == before
+
+
+@pytest.mark.usefixtures("quick_map")
+@pytest.mark.parametrize(
+    "corners",
+    [[(1, 2, 3)], [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(1, 2, 3)] * 5],
+    ids=["a vertex", "a triangle", "a flat quadrilateral", "all in one place"],
+)
+@pytest.mark.parametrize("mode", ["natural", "straight"])
+def test_meshes_that_span_no_volume_bake(corners: list[tuple[int, int, int]], mode: str) -> None:
+    obj = object_of(corners)
+    lean = obj.data.shape_keys.key_blocks["Lean"]
+    lean.points.foreach_set("co", np.add(corners, [0.0, 0.0, 2.0]).astype(np.float32).ravel())
+    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=1, mode=mode) == {'FINISHED'}
+    middle = np.empty((len(corners), 3), dtype=np.float32)
+    obj.data.shape_keys.key_blocks[2].points.foreach_get("co", middle.ravel())
+    np.testing.assert_allclose(middle, np.add(corners, [0.0, 0.0, 1.0]), atol=1e-5)
 
 
 def test_keyframes_that_leave_no_time(figure: bpy.types.Object, state: State) -> None:

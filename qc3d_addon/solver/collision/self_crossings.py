@@ -100,15 +100,16 @@ class PairCrossings:
     """How often shapes between two keys cross themselves beyond the worse key, in the keys' coordinates of any size."""
 
     def __init__(self, pair: KeyPair) -> None:
-        self._origin = pair.key0[0]
-        # In units in which cubes of coordinates are numbers.
-        self._scale = 1.0 / max(float(np.ptp(key, axis=0).max()) for key in (pair.key0, pair.key1))
+        # In units in which cubes of coordinates are numbers; powers of two lose nothing.
+        size = max(float(np.ptp(0.5 * key, axis=0).max()) for key in (pair.key0, pair.key1))
+        self._exponent = -int(np.frexp(size)[1])
+        self._origin = np.ldexp(pair.key0[0], self._exponent)
         still = (pair.key0 == pair.key1).all(axis=1)
-        self._limit = CrossingLimit(pair.faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
+        self._limit = CrossingLimit(pair.welded_faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
 
     def excess(self, shape: Floats) -> int | None:
         """Crossing pairs of triangles of ``shape`` (n, 3) beyond what the keys have; None where that is not known."""
         return self._limit.excess(self._scaled(shape))
 
     def _scaled(self, positions: Floats) -> Floats:
-        return np.asarray((positions - self._origin) * self._scale)
+        return np.asarray(np.ldexp(positions, self._exponent) - self._origin)

@@ -9,7 +9,7 @@ from functools import partial
 
 from ..arrays import Floats
 from ..keys.embedding import Embedding
-from ..keys.keypair import KeyPair
+from ..keys.keypair import KeyPair, require_sizes
 from ..keys.orientation import require_reachable
 from ..meshing.cube import fill_cube
 from ..settings import FitOptions
@@ -41,6 +41,7 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
     both keys all the same.
     """
+    require_sizes(pair)
     out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)

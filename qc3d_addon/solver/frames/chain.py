@@ -22,7 +22,7 @@ from .easing import eased
 from .frame import Frame
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
-from .report import BakeReport, Folds, crossing_notes
+from .report import BakeReport, Folds, crossing_notes, welding_notes
 
 
 def chain_frames(
@@ -80,7 +80,7 @@ def chain_frames(
             measures = measure(fits, segments, frames, [frame.values for frame in ordered if frame.values is not None])
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
-    notes += crossing_notes(crossings, wanted)
+    notes += welding_notes(pairs) + crossing_notes(crossings, wanted)
     notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",
@@ -90,6 +90,7 @@ def chain_frames(
         quality=fits[0].options.quality if fits else None,
         vertices=len(pairs[0].key0),
         tetrahedra=sum(len(fitted.mesh.tets) for fitted in fits),
+        welded=[len(pair.key0) - len(pair.welding[0]) for pair in pairs],
         folds=Folds(None, None),
         crossings=crossings,
         certificates=[frame.certificate for frame in ordered if frame.certificate is not None],

@@ -54,7 +54,7 @@ class LinearFrames:
         self._fitted = fitted
         self._maps = LinearMaps(fitted.mesh, fitted.mapped)
         self._limit = CrossingLimit(
-            fitted.pair.faces, fitted.embedding.key0, fitted.embedding.key1, fitted.embedding.still
+            fitted.pair.welded_faces, fitted.embedding.key0, fitted.embedding.key1, fitted.embedding.still
         )
         self._missed = fitted.embedding.key1 - fitted.landmarks @ fitted.mapped
 

@@ -150,13 +150,19 @@ class _LandmarkAverages:
 def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:
     """The edge that leaves the interval between its lengths in the two keys farthest, among frames (k, n, 3)."""
     edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
-    lengths = [np.linalg.norm(key[edges[:, 0]] - key[edges[:, 1]], axis=1) for key in (pair.key0, pair.key1)]
-    shortest, longest = np.minimum(*lengths), np.maximum(*lengths)
-    usable = shortest > _SHORTEST * pair.diagonal
+    # Squares of what is very large or very small are no numbers.
+    unit = max(pair.diagonal, float(np.ptp(pair.key1, axis=0).max()))
+
+    def lengths(shape: Floats, edges: Ints) -> Floats:
+        return np.asarray(np.linalg.norm((shape[edges[:, 0]] - shape[edges[:, 1]]) / unit, axis=1))
+
+    ends = lengths(pair.key0, edges), lengths(pair.key1, edges)
+    shortest, longest = np.minimum(*ends), np.maximum(*ends)
+    usable = shortest > _SHORTEST * (pair.diagonal / unit)
     edges, shortest, longest = edges[usable], shortest[usable], longest[usable]
     worst = WorstStretch(0.0, 0, 0)
     for number, frame in enumerate(frames):
-        length = np.linalg.norm(frame[edges[:, 0]] - frame[edges[:, 1]], axis=1)
+        length = lengths(frame, edges)
         excess = np.maximum(length / longest - 1.0, 1.0 - length / shortest)
         edge = int(np.argmax(excess)) if len(excess) else 0
         if len(excess) and excess[edge] > worst.excess:

@@ -28,7 +28,7 @@ _UNCROSSING_ATTEMPTS = 3
 # How often the surface is solved again around what colliders push.
 _PUSHES = 4
 # How many times as strongly the surface is drawn to the volume's anchors at a crossing.
-_STRONGEST_ANCHOR = 1e5
+_STRONGEST_ANCHOR = 1e8
 
 
 class NaturalFrames:
@@ -47,7 +47,8 @@ class NaturalFrames:
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
         if fitted.options.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
-        with beside(lambda: CrossingLimit(fitted.pair.faces, embedding.key0, embedding.key1, self.still)) as limit:
+        faces = fitted.pair.welded_faces
+        with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
             turning = _turning_inside(fitted, self._surface)
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+from ..keys.keypair import KeyPair
 
 T = TypeVar("T")
 
@@ -117,6 +118,8 @@ class BakeReport:
         Options of the fit; None in mode ``straight``.
     vertices, tetrahedra
         How many the mesh has, and the volumes of all pairs together.
+    welded
+        For each pair, how many vertices were taken as one with others, with which they coincide in both keys.
     folds
         Of the fitted maps and of the frames' maps.
     crossings
@@ -149,6 +152,7 @@ class BakeReport:
     quality: str | None
     vertices: int
     tetrahedra: int
+    welded: list[int]
     folds: Folds
     crossings: list[int | None]
     certificates: list[Certificate]
@@ -188,6 +192,17 @@ class BakeReport:
         parts["worst_stretch"] = WorstStretch(**parts["worst_stretch"])
         parts["played"] = None if parts["played"] is None else PlayedReport(**parts["played"])
         return cls(**parts)
+
+
+def welding_notes(pairs: Sequence[KeyPair]) -> list[str]:
+    """A sentence about vertices that were taken as one with others although they do not coincide exactly."""
+    most = max(pair.nearly_coincident for pair in pairs)
+    if not most:
+        return []
+    return [
+        f"{most} {'vertex differs' if most == 1 else 'vertices differ'} from others by no more than rounding in both "
+        "keys and stay together with them, as at a seam."
+    ]
 
 
 def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
+import numpy as np
+
 from ..arrays import Floats
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import PairCrossings
@@ -29,8 +31,14 @@ class StraightFrames:
         pair = self._pair
         for index, time in enumerate(times.tolist()):
             yield index / len(times)
-            positions = pair.key1 if time == 1.0 else pair.key0 + time * (pair.key1 - pair.key0)
+            positions = pair.key1 if time == 1.0 else _blended(pair.key0, pair.key1, time)
             if resolver is not None:
                 positions = resolver.cleared(index, positions, time, self._still)
             made.append(Frame(positions, self._crossings.excess(positions)))
         return made
+
+
+def _blended(key0: Floats, key1: Floats, time: float) -> Floats:
+    """(n, 3) positions on the straight lines; what is alike in both keys stays bit for bit, and nothing overflows."""
+    half = time * (key1 / 2.0 - key0 / 2.0)
+    return np.asarray(key0 + half + half)

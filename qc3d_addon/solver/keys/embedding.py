@@ -124,7 +124,8 @@ class Embedding:
         )
         both = np.concatenate([pair.key0, motion.undo(pair.key1)])
         low, high = both.min(axis=0), both.max(axis=0)
-        scale = (1.0 - 2.0 * MARGIN) / float((high - low).max())
+        size = float((high - low).max())
+        scale = (1.0 - 2.0 * MARGIN) / (size if size > 0.0 else pair.diagonal)
         return cls(pair, still, motion, 0.5 * (low + high), scale)
 
     def to_cube(self, points: Floats) -> Floats:

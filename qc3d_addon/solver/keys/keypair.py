@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..errors import InputError, naming_pair
-from ..triangles.topology import welded
+from ..triangles.topology import sides, welded
 
 # The names of the first and the second key of a pair.
 Ends = tuple[str, str]
@@ -22,6 +23,11 @@ Ends = tuple[str, str]
 # Cubes of what lies between, and squares of its areas, still are numbers.
 _SMALLEST, LARGEST = 1e-75, 1e75
 _MOST_GROWTH = 1e10
+# Copies of a vertex differ by this many steps of single precision at the largest coordinate, where several roundings
+# add up; but never by more than a part of the size, however far from the origin the mesh is.
+_SINGLE_STEP = float(np.finfo(np.float32).eps)
+_ROUNDING_STEPS = 8.0
+_MOST_ROUNDING = 3e-3
 # Where single precision tells positions only this part of a key's size apart, its shape suffers.
 _COARSE = 1e-3
 
@@ -52,35 +58,50 @@ class KeyPair:
         Raises
         ------
         InputError
-            If shapes disagree, a coordinate is not finite, an index is out of range, there are fewer than four
-            vertices, all vertices of a key lie in one plane, line or point, or sizes are beyond all reason.
+            If shapes disagree, a coordinate is not finite, an index is out of range, or there are no vertices.
         """
         first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
         if first.shape != second.shape:
             raise InputError(
                 f"The keys have {len(first)} and {len(second)} vertices; both must be shapes of the same mesh."
             )
-        if len(first) < 4:
-            raise InputError(f"The mesh has {len(first)} vertices; at least 4 are needed to span a volume.")
-        for key, name in ((first, "first"), (second, "second")):
-            try:
-                _require_volume(key, name)
-            except InputError as error:
-                raise _lost_far_away(first, second) or error from None
-        _require_like_sizes(first, second)
+        if not len(first):
+            raise InputError("The mesh has no vertices; there is nothing to move.")
         triangles = _indices(faces, 3, len(first), "faces")
         wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
         return cls(first, second, triangles, wires)
 
     @cached_property
     def diagonal(self) -> float:
-        """Length of the first key's bounding-box diagonal, the unit of relative errors."""
-        return float(np.linalg.norm(np.ptp(self.key0, axis=0)))
+        """Length of the first key's bounding-box diagonal, the unit of relative errors.
+
+        Of the second key where all vertices of the first are in one place; 1 where those of both are.
+        """
+        lengths = (hypot(*np.ptp(key, axis=0)) for key in (self.key0, self.key1))
+        return next((length for length in lengths if length > 0.0), 1.0)
 
     @cached_property
     def welding(self) -> tuple[Ints, Ints]:
-        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,)."""
-        return welded(self.key0, self.key1)
+        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,).
+
+        Copies of a vertex may differ by a few steps of single precision, in which meshes are stored: at seams whose
+        sides were computed apart, or between objects that were joined.
+        """
+        reach = (_rounding(self.key0), _rounding(self.key1))
+        return welded(self.key0, self.key1, reach, np.concatenate([sides(self.faces), self.edges]))
+
+    @cached_property
+    def welded_faces(self) -> Ints:
+        """(m, 3) the triangles with one vertex of each group at their corners, so that they meet at seams."""
+        vertices, group = self.welding
+        return np.asarray(vertices[group[self.faces]])
+
+    @cached_property
+    def nearly_coincident(self) -> int:
+        """How many vertices are taken as one with another although rounding has moved them apart in a key."""
+        vertices, group = self.welding
+        apart = [(key != key[vertices][group]).any(axis=1) for key in (self.key0, self.key1)]
+        return int(np.count_nonzero(apart[0] | apart[1]))
 
     @cached_property
     def far_away(self) -> str | None:
@@ -152,32 +173,42 @@ def _positions(key: ArrayLike, name: str) -> Floats:
             f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
             f"({bad.size} such vertices); repair the key first."
         )
-    largest = float(np.abs(positions).max(initial=0.0))
-    if largest > LARGEST:
-        raise InputError(f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {LARGEST:.0e}.")
     return positions
 
 
-def _require_volume(key: Floats, name: str) -> None:
-    spread = key - key.mean(axis=0)
-    size = np.abs(spread).max()
-    if 0.0 < size < _SMALLEST:
-        raise InputError(f"The {name} key is only {size:.0e} in size; scale the mesh to above {_SMALLEST:.0e}.")
-    thickness = 0.0 if size == 0.0 else np.linalg.svd(spread / size, compute_uv=False)[-1] / np.sqrt(len(key))
-    if thickness < 1e-9:
+def require_sizes(pair: KeyPair) -> None:
+    """Check that what is computed on the way from one key to the other fits into floating point.
+
+    Raises
+    ------
+    InputError
+        If a key is too large, too small, or far larger or smaller than the other.
+    """
+    sizes = []
+    for key, name in ((pair.key0, "first"), (pair.key1, "second")):
+        largest = float(np.abs(key).max())
+        if largest > LARGEST:
+            raise InputError(
+                f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {LARGEST:.0e}, or choose "
+                "the mode straight."
+            )
+        sizes.append(float(np.ptp(key, axis=0).max()))
+        if 0.0 < sizes[-1] < _SMALLEST:
+            raise InputError(
+                f"The {name} key is only {sizes[-1]:.0e} in size; scale the mesh to above {_SMALLEST:.0e}, or choose "
+                "the mode straight."
+            )
+    if min(sizes) > 0.0 and not 1.0 / _MOST_GROWTH <= sizes[1] / sizes[0] <= _MOST_GROWTH:
         raise InputError(
-            f"All vertices of the {name} key lie in one plane, line or point; "
-            "in-betweens need a key that spans a volume."
+            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, more than numbers can hold; "
+            "bring both keys to like sizes, or choose the mode straight."
         )
 
 
-def _require_like_sizes(first: Floats, second: Floats) -> None:
-    ratio = float(np.ptp(second, axis=0).max() / np.ptp(first, axis=0).max())
-    if not 1.0 / _MOST_GROWTH <= ratio <= _MOST_GROWTH:
-        raise InputError(
-            f"The second key is {ratio:.0e} times as large as the first, more than numbers can hold; "
-            "bring both keys to like sizes."
-        )
+def _rounding(key: Floats) -> float:
+    """How far apart copies of a vertex may be along an axis."""
+    steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
+    return min(steps, _MOST_ROUNDING * float(np.ptp(key, axis=0).max(initial=0.0)))
 
 
 def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:

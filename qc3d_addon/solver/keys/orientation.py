@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Floats
 from ..errors import InputError
-from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
+from ..numerics.grouped_sums import sums_by_label
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.geometry import areas
 from ..triangles.topology import sides, unique_edges, vertex_components
@@ -18,9 +18,6 @@ from .keypair import KeyPair
 
 # Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
 _MOST_SHARE = 0.5
-# A part is a mirror image where this fits so much better than any turn, and turns leave so much, relative to its size.
-_BETTER = 0.25
-_LEFT_BY_TURNS = 0.1
 # Volumes below this part of the size cubed are none; parts that are as small as the second are named all the same.
 _LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
 # What is turned inside out holds, for its surface, at least this part of the volume that it held before: what crosses
@@ -35,7 +32,7 @@ class Reversal:
     Parameters
     ----------
     mirrored : float
-        Of the first key's surface, 0..1: components that are mirror images or turned inside out.
+        Of the first key's surface, 0..1: closed components that are mirror images or turned inside out.
     tangled : float
         The same for closed components that cross themselves so far, or are so flat, that their signed volume has the
         other sign.
@@ -82,9 +79,8 @@ def mirrored_share(pair: KeyPair) -> float:
 def reversal(pair: KeyPair) -> Reversal:
     """What is mirrored, turned inside out or tangled between the keys.
 
-    Closed components are told by the sign of the volume that they enclose. Others are told by what a rotation with
-    scaling and what a reflection with scaling leave of them (Kabsch 1976): flat ones, whose mirror image a turn
-    reaches, are never mirrored.
+    Told by the sign of the volume that a closed component encloses. What is open has no inside that could be turned
+    out: a leaf may bend to its mirror image.
     """
     vertices, group = pair.welding
     keys = [_in_unit_size(key[vertices]) for key in (pair.key0, pair.key1)]
@@ -93,15 +89,12 @@ def reversal(pair: KeyPair) -> Reversal:
     closed = ClosedComponents(faces, labels)
     volumes = np.stack([closed.volumes(key) for key in keys])
     count = volumes.shape[1]
-    is_closed = np.zeros(count, dtype=bool)
-    is_closed[labels[closed.faces[:, 0]]] = True
-    is_image = _are_mirror_images(keys[0], keys[1], labels)
     flips, least = volumes[0] * volumes[1] < 0.0, np.abs(volumes).min(axis=0)
     surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
     full = np.abs(volumes) / np.maximum(surface, 1e-100) ** 1.5
-    is_real = is_image | (full[1] > _AS_FULL * full[0])
-    is_reversed = np.where(is_closed, flips & (least > _LEAST_VOLUME), is_image)
-    is_part = np.where(is_closed, flips & (least > _LEAST_OF_A_PART), is_image)
+    is_real = full[1] > _AS_FULL * full[0]
+    is_reversed = flips & (least > _LEAST_VOLUME)
+    is_part = flips & (least > _LEAST_OF_A_PART)
     total = max(float(surface[0].sum()), 1e-300)
     mirrored, tangled = (float(surface[0] @ (is_reversed & chosen)) / total for chosen in (is_real, ~is_real))
     return Reversal(mirrored, tangled, int((is_part & is_real).sum()))
@@ -109,24 +102,5 @@ def reversal(pair: KeyPair) -> Reversal:
 
 def _in_unit_size(key: Floats) -> Floats:
     low, high = key.min(axis=0), key.max(axis=0)
-    return np.asarray((key - low) / (high - low).max())
-
-
-def _are_mirror_images(key0: Floats, key1: Floats, labels: Ints) -> Bools:
-    """(components,) whether a reflection carries a component onto the other key, and no turn does."""
-    spread = [key - means_by_label(labels, key)[labels] for key in (key0, key1)]
-    sizes = [np.sqrt(sums_by_label(labels, (points**2).sum(axis=1))) for points in spread]
-    scale = sizes[0] * sizes[1]
-    usable = scale > 0.0
-    covariances = covariances_by_label(labels, spread[1], spread[0])[usable] / scale[usable, None, None]
-    left, kept, right = np.linalg.svd(covariances)
-    is_odd = np.linalg.det(left) * np.linalg.det(right) < 0.0
-    by_turn = _left_over(kept[:, 0] + kept[:, 1] - kept[:, 2])
-    by_reflection = _left_over(kept.sum(axis=1))
-    found = np.zeros(len(scale), dtype=bool)
-    found[usable] = is_odd & (by_reflection < _BETTER * by_turn) & (by_turn > _LEFT_BY_TURNS)
-    return found
-
-
-def _left_over(kept: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.maximum(1.0 - kept**2, 0.0)))
+    size = float((high - low).max())
+    return np.asarray((key - low) / (size if size > 0.0 else 1.0))

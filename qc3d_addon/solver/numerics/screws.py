@@ -21,6 +21,7 @@ def best_turns(covariances: Floats) -> Floats:
     covariances : (k, 3, 3)
         Sums of weight times target times source (outer products), both from their centres. Where it has rank 1, the
         points of a set lie in one line, which leaves the spin about it free: they turn no further than their line.
+        Points in one place do not turn.
     """
     left, sizes, right = np.linalg.svd(covariances)
     lines = np.flatnonzero(sizes[:, 1] <= _LINE * sizes[:, 0])
@@ -31,7 +32,7 @@ def best_turns(covariances: Floats) -> Floats:
     # Opposite directions: half a turn about anything across the line.
     opposite = sine < _LINE
     axis = np.where(opposite[:, None], right[lines, 1], axis / np.where(opposite, 1.0, sine)[:, None])
-    turns[lines] = np.arctan2(sine, cosine)[:, None] * axis
+    turns[lines] = np.where(sizes[lines, :1] > 0.0, np.arctan2(sine, cosine)[:, None] * axis, 0.0)
     return turns
 
 

@@ -34,7 +34,7 @@ from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
 from .tangents import tangents_of
 
-ANCHOR_WEIGHT = 0.05
+ANCHOR_WEIGHT = 5e-5
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -73,6 +73,9 @@ class SurfacePath:
         self._law: StretchLaw = law
         self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
+        self._apart = None
+        if embedding.pair.nearly_coincident:
+            self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
         self._travel = key1 - self._key0
         still = embedding.still[self.vertices]
         count = len(self.vertices)
@@ -94,9 +97,9 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
-        size = float(np.linalg.norm(np.ptp(self._key0, axis=0)))
-        area = float(self.deformation.weights.sum()) or size**2
-        self._anchor_weights = ANCHOR_WEIGHT * area / size**2 * weights
+        area = float(self.deformation.weights.sum())
+        density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
+        self._anchor_weights = ANCHOR_WEIGHT * density * weights
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
             usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights
@@ -160,7 +163,14 @@ class SurfacePath:
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
         """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
         settled = Sweeps(self._surface, [self._wanted(*moment) for moment in moments]).settled(sweeps)
-        return [shape[self._group] for shape in settled]
+        return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
+
+    def _unwelded(self, shape: Floats, time: float) -> Floats:
+        """Positions (n, 3) of all vertices: copies are as far from the one of their group as in the keys."""
+        positions = shape[self._group]
+        if self._apart is not None:
+            positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
+        return positions
 
     def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]

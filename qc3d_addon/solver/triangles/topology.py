@@ -7,28 +7,63 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 
 
-def welded(key0: Floats, key1: Floats) -> tuple[Ints, Ints]:
-    """Vertices that coincide exactly in both keys (n, 3) count as one.
+def welded(
+    key0: Floats, key1: Floats, reach: tuple[float, float] = (0.0, 0.0), edges: Ints | None = None
+) -> tuple[Ints, Ints]:
+    """Vertices that coincide in both keys (n, 3) count as one.
+
+    Parameters
+    ----------
+    key0, key1 : (n, 3)
+    reach : tuple of float
+        How far apart along each axis vertices may be in the first and in the second key and still coincide.
+    edges : (e, 2) int64, optional
+        Ends of an edge are no copies of each other: a group with such a pair in it only holds what coincides exactly.
 
     Returns
     -------
     representatives : (k,) int64
         One vertex of each group.
     group : (n,) int64
-        The group of every vertex: ``positions[representatives][group]`` are all positions.
+        The group of every vertex: ``positions[representatives][group]`` are all positions, within the reach.
     """
-    _, representatives, group = np.unique(
-        np.concatenate([key0, key1], axis=1), axis=0, return_index=True, return_inverse=True
-    )
+    both = np.concatenate([key0, key1], axis=1)
+    _, representatives, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    group = group.ravel()
+    if max(reach) > 0.0:
+        joined = _joined_groups(both[representatives], reach, group[edges] if edges is not None else None)
+        count = int(joined.max(initial=-1)) + 1
+        first = np.full(count, len(both))
+        np.minimum.at(first, joined, representatives)
+        representatives, group = first, joined[group]
     # Groups in the order of the vertices keep sparse factors and reports in the mesh's own order.
     order = np.argsort(representatives)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
-    return representatives[order].astype(np.int64), rank[group.ravel()]
+    return representatives[order].astype(np.int64), rank[group]
+
+
+def _joined_groups(both: Floats, reach: tuple[float, float], edges: Ints | None) -> Ints:
+    """(k,) labels of points (k, 6), in both keys, that are joined within the reach and have no edge among them."""
+    count = len(both)
+    # In a key that is squashed into a point everything would be near everything.
+    sizes = np.ptp(both, axis=0).reshape(2, 3).max(axis=1)
+    key = int(np.argmin(np.divide(reach, sizes, out=np.full(2, np.inf), where=sizes > 0.0)))
+    near = cKDTree(both[:, 3 * key : 3 * key + 3]).query_pairs(reach[key], p=np.inf, output_type="ndarray")
+    apart = np.abs(both[near[:, 0]] - both[near[:, 1]])
+    near = near[(apart <= np.repeat(reach, 3)).all(axis=1)]
+    labels = vertex_components(near, count)
+    if edges is not None and len(near):
+        touching = (labels[edges[:, 0]] == labels[edges[:, 1]]) & (edges[:, 0] != edges[:, 1])
+        torn = np.zeros(count, dtype=bool)
+        torn[labels[edges[touching, 0]]] = True
+        labels = vertex_components(near[~torn[labels[near[:, 0]]]], count)
+    return labels
 
 
 def without_piles(points: Floats, most: int) -> Ints:

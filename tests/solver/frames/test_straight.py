@@ -35,7 +35,8 @@ def straight(through: tuple[str, ...], times: list[float], **choices: str) -> Ba
 
 def test_frames_are_on_the_lines() -> None:
     bake = straight(("a", "c"), [0.0, 0.25, 1.0])
-    np.testing.assert_array_equal(bake.frames, [BAR, BAR + 0.25 * (SHAPES["c"] - BAR), SHAPES["c"]])
+    np.testing.assert_allclose(bake.frames, [BAR, BAR + 0.25 * (SHAPES["c"] - BAR), SHAPES["c"]], rtol=0.0, atol=1e-15)
+    np.testing.assert_array_equal(bake.frames[[0, 2]], [BAR, SHAPES["c"]])
     assert json.loads(json.dumps(bake.report.as_json(), allow_nan=False))["residual"] is None
     assert bake.report.worst_stretch.excess == pytest.approx(0.5)  # edges across are half as long
 
@@ -46,6 +47,37 @@ def test_a_chain_with_easing_meets_every_key() -> None:
     expected = SHAPES["b"] + along * (SHAPES["c"] - SHAPES["b"])
     np.testing.assert_allclose(bake.frames[[0, 3]], [BAR, SHAPES["c"]], atol=0.0)
     np.testing.assert_allclose(bake.frames[2], expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        (BAR[:1], BAR[1:2]),
+        (BAR[:1], BAR[:1]),
+        (BAR[:3], BAR[1:4]),
+        (BAR * [1, 0, 1], BAR * [1, 1, 0]),
+        (np.zeros_like(BAR), BAR),
+        (BAR, np.ones_like(BAR)),
+        (np.zeros_like(BAR), np.ones_like(BAR)),
+        (1e300 * BAR, -1e300 * BAR),
+        (1e-300 * BAR, 1e300 * BAR),
+        (1e300 * BAR, 1e-310 * BAR),
+        (1e-310 * BAR, -1e-310 * BAR),
+    ],
+    ids=lambda keys: f"{keys[0].shape[0]} vertices, {np.ptp(keys[0]):.0e} to {np.ptp(keys[1]):.0e}",
+)
+def test_nothing_that_is_finite_is_refused(keys: tuple[np.ndarray, np.ndarray]) -> None:
+    faces = FACES if len(keys[0]) == len(BAR) else NO_EDGES.reshape(0, 3)
+    task = Task.of_keys(
+        dict(zip("ab", keys, strict=True)), faces, NO_EDGES, ("a", "b"), frame_options=FrameOptions("straight"),
+        times=[0.0, 0.25, 1.0],
+    )
+    with np.errstate(all="raise", under="ignore"):
+        bake = finish(carry_out(task)).bake
+    assert bake is not None
+    expected = [keys[0], 0.75 * keys[0] + 0.25 * keys[1], keys[1]]
+    np.testing.assert_allclose(bake.frames, expected, rtol=1e-12, atol=1e-14 * np.abs(keys).max())
+    json.dumps(bake.report.as_json(), allow_nan=False)
 
 
 @pytest.mark.parametrize("scale", [1e-74, 1e-30, 1e30, 1e74])

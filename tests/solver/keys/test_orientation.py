@@ -25,21 +25,20 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 TURN = rotation_matrices(np.array([[0.3, 0.9, -0.5]]))[0]
 RANDOM = np.random.default_rng(0)
 MIXED = np.where(np.arange(len(FACES))[:, None] % 2, FACES, FACES[:, ::-1])
-CUP = BALL_FACES[BALL[BALL_FACES].mean(axis=1)[:, 2] > 0.3]
+CUP_OF_BAR = FACES[BAR[FACES].mean(axis=1)[:, 2] > 2.0]
 
 
 def share(key0: Floats, key1: Floats, faces: Ints) -> float:
     return mirrored_share(KeyPair.checked(key0, key1, faces))
 
 
-@pytest.mark.parametrize("faces", [FACES, OPEN], ids=["closed", "open"])
 @pytest.mark.parametrize("scale", [1e-30, 1e-3, 1.0, 1e30])
 @pytest.mark.parametrize("growth", [0.1, 1.0, 20.0])
-def test_mirrored_and_turned_as_a_whole(faces: Ints, scale: float, growth: float) -> None:
+def test_mirrored_and_turned_as_a_whole(scale: float, growth: float) -> None:
     lopsided = scale * (BAR + 0.3 * BAR[:, 2:] ** 2 * [0.1, 0.0, 0.0])
-    assert share(lopsided, growth * lopsided @ MIRROR @ TURN.T + 3.0 * scale, faces) == 1.0
-    assert share(lopsided, -growth * lopsided, faces) == 1.0
-    assert share(lopsided, growth * lopsided @ TURN.T + 3.0 * scale, faces) == 0.0
+    assert share(lopsided, growth * lopsided @ MIRROR @ TURN.T + 3.0 * scale, FACES) == 1.0
+    assert share(lopsided, -growth * lopsided, FACES) == 1.0
+    assert share(lopsided, growth * lopsided @ TURN.T + 3.0 * scale, FACES) == 0.0
 
 
 @pytest.mark.parametrize("faces", [FACES, OPEN, FACES[:, ::-1], MIXED])
@@ -53,15 +52,11 @@ def test_not_mirrored(key1: Floats, faces: Ints) -> None:
     assert share(BAR, key1 @ TURN.T, faces) == 0.0
 
 
-def test_a_flat_part_reaches_its_mirror_image_by_a_turn() -> None:
-    sheet, faces = box_surface((4, 4, 1), (2.0, 2.0, 0.0))
-    sheet = sheet + 0.02 * RANDOM.normal(size=sheet.shape)
-    assert share(sheet, sheet @ MIRROR, faces[: len(faces) // 3]) == 0.0
-
-
-def test_an_open_cup_that_is_mirrored() -> None:
-    lopsided = BALL + 0.4 * BALL**2 @ np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])
-    assert share(lopsided, lopsided @ MIRROR, CUP) == 1.0
+@pytest.mark.parametrize("faces", [OPEN, CUP_OF_BAR, FACES[:1]])
+def test_what_is_open_has_no_inside_to_turn_out(faces: Ints) -> None:
+    # A leaf or a flag may well bend to its mirror image.
+    for key1 in (BAR @ MIRROR, -BAR, BAR @ MIRROR @ TURN.T + 3.0):
+        assert share(BAR, key1, faces) == 0.0
 
 
 def test_points_and_wires_have_no_surface_to_mirror() -> None:

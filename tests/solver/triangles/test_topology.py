@@ -70,6 +70,39 @@ class TestWelded:
         key = np.array([[0.0, 1.0, 0.0], [-0.0, 1.0, 0.0]])
         assert welded(key, key)[1].tolist() == [0, 0]
 
+    @given(st.integers(0, 2**32 - 1), st.sampled_from([1e-6, 1.0, 1e6]))
+    def test_copies_within_the_reach_of_both_keys(self, seed: int, size: float) -> None:
+        random = np.random.default_rng(seed)
+        key0, key1 = size * random.uniform(1.0, 9.0, size=(2, 20, 3)).round(1)
+        again = random.permutation(np.concatenate([np.arange(20), random.integers(0, 20, 15)]))
+        reach = (1e-6 * size, 3e-6 * size)
+        moved0, moved1 = (
+            key[again] + random.uniform(-0.5, 0.5, size=(35, 3)) * one
+            for key, one in zip((key0, key1), reach, strict=True)
+        )
+        representatives, group = welded(moved0, moved1, reach)
+        np.testing.assert_array_equal(again[representatives][group], again)
+        assert len(representatives) == 20
+        assert len(welded(moved0, moved1)[0]) == len(np.unique(np.concatenate([moved0, moved1], axis=1), axis=0))
+
+    @pytest.mark.parametrize("parted", [0, 1])
+    def test_copies_must_be_within_the_reach_in_both_keys(self, parted: int) -> None:
+        keys = [np.zeros((2, 3)), np.zeros((2, 3))]
+        keys[parted][1, 1] = 2e-6
+        assert welded(*keys, (1e-6, 1e-6))[1].tolist() == [0, 1]
+
+    def test_ends_of_an_edge_are_no_copies(self) -> None:
+        # Three copies in a row, and a tiny triangle whose first corner also exists twice, exactly.
+        key = np.array([[0.0, 0, 0], [1e-6, 0, 0], [2e-6, 0, 0], [5, 0, 0], [5 + 1e-6, 0, 0], [5, 1e-6, 0], [5, 0, 0]])
+        triangle = np.array([[3, 4], [4, 5], [3, 5]])
+        assert welded(key, key, (1.5e-6, 1.5e-6))[1].tolist() == [0, 0, 0, 1, 1, 1, 1]
+        assert welded(key, key, (1.5e-6, 1.5e-6), triangle)[1].tolist() == [0, 0, 0, 1, 2, 3, 1]
+
+    def test_a_key_in_one_point_does_not_slow_the_search(self) -> None:
+        key = np.random.default_rng(0).uniform(size=(30_000, 3))
+        for keys in ((key, np.zeros_like(key)), (np.ones_like(key), key)):
+            assert len(welded(*keys, (1e-7, 1e-7))[0]) == len(key)
+
     def test_a_sphere_of_single_triangles_becomes_one(self) -> None:
         points, faces = icosphere(1)
         loose = points[faces.ravel()]

@@ -92,10 +92,19 @@ class Sweeps:
     ----------
     surface : MovingSurface
     wanted : sequence of Wanted
+    holds_volumes : bool
+        Whether closed components get the volumes that are wanted.
+
+    Attributes
+    ----------
+    corrected : (q,)
+        For each shape the largest part of a wanted volume that is missing half-way, before volumes are looked at.
     """
 
-    def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted]) -> None:
+    def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted], holds_volumes: bool = True) -> None:
         self._surface = surface
+        self._holds_volumes = holds_volumes and not surface.volumes.empty
+        self.corrected = np.zeros(len(wanted))
         self._wanted = wanted
         self._moving = slice(0, len(surface.moving))
         # The moving vertices, then those beside them.
@@ -122,7 +131,8 @@ class Sweeps:
         for sweep in range(1, sweeps):
             present, refitted = self._moved.copy(), self._refitted()
             # The first half gets by without volumes.
-            if 2 * sweep > sweeps:
+            if 2 * sweep > sweeps and self._holds_volumes:
+                self.corrected = self.corrected if self.corrected.any() else self._missing()
                 refitted = self._with_volumes(refitted)
             # Of a shape that has settled only rounding would be amplified.
             going &= np.abs(refitted - present).max(axis=(0, 2)) > _SETTLED
@@ -207,10 +217,8 @@ class Sweeps:
     def _with_volumes(self, moved: Floats) -> Floats:
         """Positions (3, q, k) moved on until, to first order, every closed component has its volume."""
         volumes = self._surface.volumes
-        if volumes.empty:
-            return moved
         found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-        direction = self._direction(np.stack([slope for _, slope in found], axis=1))
+        direction = self._direction()
         present, result = self._moved, np.empty_like(moved)
         for shape, (enclosed, slope) in enumerate(found):
             missing = self._missing_volumes[shape] - enclosed
@@ -219,10 +227,19 @@ class Sweeps:
             result[:, shape] = volumes.stepped(moved[:, shape], direction[:, shape], slope, missing)
         return result
 
-    def _direction(self, slopes: Floats) -> Floats:
+    def _missing(self) -> Floats:
+        """(q,) the largest part of a wanted volume that any component of each shape misses."""
+        shapes = self._positions.transpose(1, 0, 2)
+        found = np.stack([self._surface.volumes.with_slope(shape)[0] for shape in shapes])
+        wanted = np.abs(np.stack([shape.volumes for shape in self._wanted]))
+        missing = np.abs(np.stack(self._missing_volumes) - found)
+        return np.asarray((missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0))
+
+    def _direction(self) -> Floats:
         """(3, q, k) K^-1 grad V where it is first asked for; shapes change too little for it to be worth renewing."""
         if self._volume_direction is None:
-            self._volume_direction = self._surface.solve(slopes)
+            even = [self._surface.volumes.even_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
+            self._volume_direction = self._surface.solve(np.stack(even, axis=1))
         return self._volume_direction
 
     def _limited(self, missing: Floats, shape: int) -> Floats:
@@ -233,11 +250,11 @@ class Sweeps:
     def _restore_volumes(self) -> None:
         """Steps along K^-1 grad V until every closed component of every shape has its volume."""
         volumes = self._surface.volumes
-        if volumes.empty:
+        if not self._holds_volumes:
             return
         for _ in range(_LAST_VOLUME_STEPS):
             found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-            direction = self._direction(np.stack([slope for _, slope in found], axis=1))
+            direction = self._direction()
             restored = True
             for shape, (enclosed, slope) in enumerate(found):
                 missing = self._missing_volumes[shape] - enclosed

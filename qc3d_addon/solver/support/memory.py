@@ -10,7 +10,7 @@ import sys
 from ..errors import InputError
 from ..settings import Quality
 
-# Measured by benchmarks/large.py, with a margin; docs/limits.md has the figures.
+# Measured by benchmarks/large.py, with a margin; docs/guide/limits.md has the figures.
 _MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0}
 _KB_PER_VERTEX = 4.3  # of every pair: the surface's factors and the frames that are worked on at once
 _BYTES_PER_POSITION = 110.0  # of every vertex in every frame: positions, measures, and what makes them

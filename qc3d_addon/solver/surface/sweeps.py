@@ -132,7 +132,7 @@ class Sweeps:
             present, refitted = self._moved.copy(), self._refitted()
             # The first half gets by without volumes.
             if 2 * sweep > sweeps and self._holds_volumes:
-                self.corrected = self.corrected if self.corrected.any() else self._missing()
+                self._note_missing()
                 refitted = self._with_volumes(refitted)
             # Of a shape that has settled only rounding would be amplified.
             going &= np.abs(refitted - present).max(axis=(0, 2)) > _SETTLED
@@ -140,6 +140,7 @@ class Sweeps:
                 break
             following = iteration.next(present, refitted)
             self._move(following if going.all() else np.where(going[:, None], following, present))
+        self._note_missing()
         self._move(self._corrected(False))
         self._restore_volumes()
 
@@ -227,13 +228,15 @@ class Sweeps:
             result[:, shape] = volumes.stepped(moved[:, shape], direction[:, shape], slope, missing)
         return result
 
-    def _missing(self) -> Floats:
-        """(q,) the largest part of a wanted volume that any component of each shape misses."""
+    def _note_missing(self) -> None:
+        """Keep what volumes miss where they are looked at for the first time."""
+        if not self._holds_volumes or self.corrected.any():
+            return
         shapes = self._positions.transpose(1, 0, 2)
         found = np.stack([self._surface.volumes.with_slope(shape)[0] for shape in shapes])
         wanted = np.abs(np.stack([shape.volumes for shape in self._wanted]))
         missing = np.abs(np.stack(self._missing_volumes) - found)
-        return np.asarray((missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0))
+        self.corrected = (missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0)
 
     def _direction(self) -> Floats:
         """(3, q, k) K^-1 grad V where it is first asked for; shapes change too little for it to be worth renewing."""

@@ -28,6 +28,7 @@ _NEIGHBOURS = 16  # at this oversampling, few candidates have more neighbors ins
 # What is thin has short edges across it, where they are this percentile of all.
 _SHORT_PERCENTILE = 2.0
 _SAMPLES_OF_AN_EDGE = 0.25  # the part of an edge between two samples
+_COARSEST = 2.0
 _MOST_CANDIDATES = 500_000  # of a surface: where it is folded more densely, further ones would be rejected anyway
 
 

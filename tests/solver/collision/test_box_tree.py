@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boxes that meet against every pair of boxes compared, on meshes, soups and fans of any size."""
+"""Overlapping boxes against a comparison of all pairs, on meshes, triangle soups and fans of any size."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps compressed and restored: what is exact, what is bounded."""
+"""Maps compressed and decompressed: what is exact, and which errors are bounded."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a surface, compressed and restored."""
+"""Frames of a surface, compressed and decompressed."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The filled cube: a conforming partition at every quality, notes and errors of both engines."""
+
 from __future__ import annotations
 
 from pathlib import Path

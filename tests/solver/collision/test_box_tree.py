@@ -49,6 +49,7 @@ def test_random_meshes_in_shapes_far_from_those_the_tree_was_built_for(seed: int
         assert found(tree, points, faces) == sorted(without_neighbours(compared(points, faces, moving), faces))
 
 
+@pytest.mark.slow
 def test_a_sphere_that_is_crumpled() -> None:
     points, faces = icosphere(3)
     crumpled = points * np.random.default_rng(3).uniform(0.2, 1.0, (len(points), 1))

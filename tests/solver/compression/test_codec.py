@@ -136,6 +136,7 @@ class TestTransfer:
         assert 0.0 < lost["fitted"] < 0.5 * min(lost["published"], lost["logarithm"])
 
 
+@pytest.mark.slow
 class TestRates:
     @pytest.fixture(autouse=True)
     def _few_modes(self, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,6 +29,7 @@ def frames() -> Floats:
     return UNIT * np.array(shapes) + 100.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [3e-3, 1e-5])
 def test_frames_come_back_within_the_error(error: float) -> None:
     wanted = frames()
@@ -44,6 +45,7 @@ def test_frames_come_back_within_the_error(error: float) -> None:
     assert len(data) < len(compressor.quantised_coordinates(choice.error).data)
 
 
+@pytest.mark.slow
 def test_modes_alone_follow_the_frames() -> None:
     wanted = frames()
     compressor = frame_compression.compressor(wanted, FACES, 16)

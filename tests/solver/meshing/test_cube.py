@@ -115,6 +115,7 @@ def test_point_clouds_are_surrounded_by_the_second_engine(name: str) -> None:
     assert smallest_dihedral_angles(filled.mesh).min() > 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_finer_qualities_have_more_tetrahedra(engine: str) -> None:
     counts = [

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command that writes, with inputs that it finds in the working folder, and what the attacks look at."""
+"""All commands that write files, with inputs in the working folder, and what the attacks check."""
 
 from __future__ import annotations
 

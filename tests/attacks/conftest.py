@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the attacks share: a user without rights, a small disk, small inputs, and the command as a program.
+"""Shared by the attacks: a user without rights, a small disk, small inputs, and the command as a program.
 
-Everything happens in a folder of the test's own, never with the machine's devices or its folder for temporary files.
+Everything happens in a folder of the test, never in the machine's devices or its folder for temporary files.
 """
 
 from __future__ import annotations

@@ -46,6 +46,7 @@ def test_the_order_can_be_turned() -> None:
     assert off(turned.shape, posed(REST, 80.0, 90.0, SIDE)) > 0.1
 
 
+@pytest.mark.slow
 def test_three_keys() -> None:
     wrist = REST.copy()
     beyond = np.maximum(REST[:, 0] - 3.3, 0.0)
@@ -61,6 +62,7 @@ def test_three_keys() -> None:
     assert off(found.shape, truth) < 1e-3
 
 
+@pytest.mark.slow
 def test_partly_on_adds_nothing_to_what_each_key_shows() -> None:
     raised, bent = posed(REST, 60.0, 0.0), posed(REST, 0.0, 60.0, SIDE)
     halves = [posed(REST, 30.0, 0.0), posed(REST, 0.0, 30.0, SIDE)]
@@ -161,6 +163,7 @@ def test_the_arm_of_the_cases(second: str, data_folder: Path) -> None:
     assert found.crossings == 0
 
 
+@pytest.mark.slow
 def test_a_mouth_opens_smiling_without_new_crossings(data_folder: Path) -> None:
     with np.load(data_folder / "head.npz", allow_pickle=False) as stored:
         names = stored["shape_names"].tolist()

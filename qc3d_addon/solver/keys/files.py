@@ -55,6 +55,26 @@ def read_pairs(
         If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if the machine
         does not have enough memory.
     """
+    pairs = len(set(pairwise(names)))
+    shapes, faces, polygons = read_shapes(
+        path, names, pairs=pairs, frames=frames, quality=quality, needs_fits=needs_fits
+    )
+    return consecutive_pairs(shapes, faces, None, names, polygons, mirror)
+
+
+def read_shapes(
+    path: Path,
+    names: Sequence[str],
+    *,
+    pairs: int = 0,
+    frames: int = 0,
+    quality: Quality = "normal",
+    needs_fits: bool = True,
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any], NDArray[Any] | None]:
+    """Shapes (n, 3) of one mesh by their names, its triangles (m, 3), and their polygons (m,) where the file has them.
+
+    See ``read_pairs``; memory is checked for so many ``pairs``.
+    """
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
         known = _shape_names(archive, path)
         for name in names:
@@ -66,14 +86,12 @@ def read_pairs(
         for name, array in arrays.items():
             _require_coordinates(headers[array], name, path)
         vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
-        pairs = len(set(pairwise(names)))
         needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
         if limit := machine_limit_mb():
             require_memory(needed, limit, vertices)
         found = archive.read(headers)
-    shapes = {name: found[array] for name, array in arrays.items()}
     labels = polygon_labels(found["polygons"], found["faces"]) if polygons else None
-    return consecutive_pairs(shapes, found["faces"], None, names, labels, mirror)
+    return {name: found[array] for name, array in arrays.items()}, found["faces"], labels
 
 
 def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") -> KeyPair:

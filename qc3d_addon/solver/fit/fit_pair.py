@@ -18,6 +18,7 @@ from ..support.threads import beside
 from ..surface.path import SurfacePath
 from ..tets.point_location import interpolation_matrix
 from .continuation import follow_path, path_to
+from .directions import path_between
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
 
@@ -97,7 +98,7 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
     """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
-        path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
+        path = path_between(embedding, options)
         return path, path_to(path, embedding.key1)
 
 

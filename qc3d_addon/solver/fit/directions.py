@@ -9,11 +9,13 @@ import numpy as np
 from ..arrays import Ints
 from ..collision.self_crossings import CrossingLimit
 from ..keys.embedding import Embedding
+from ..numerics.grouped_sums import means_by_label
 from ..settings import FitOptions
 from ..surface.path import SurfacePath
 
 _LOOKED_AT = (0.25, 0.5, 0.75)
 _SWEEPS = 4
+_AS_LONG = np.radians(10.0)
 # Parts that are tried the other way: each costs three more shapes.
 _MOST_TRIED = 8
 
@@ -48,3 +50,12 @@ def _crossings(limit: CrossingLimit, path: SurfacePath) -> tuple[int, Ints]:
     involved = np.logical_or.reduce([limit.new_vertices(shape) for shape in shapes])
     parts = path.half_turned
     return sum(limit.excess(shape) or 0 for shape in shapes), parts[np.isin(parts, path.components[involved])]
+
+
+def half_turned_parts(path: SurfacePath) -> int:
+    """How many parts, or whether everything as one, turn so nearly by half that the other way is as long."""
+    if np.linalg.norm(path.whole_turn) > np.pi - _AS_LONG:
+        return 1
+    owners = path.components[path.vertices[path.deformation.faces[:, 0]]]
+    mean = np.linalg.norm(means_by_label(owners, path.turning.swing, path.deformation.weights), axis=1)
+    return int((np.abs(mean[path.half_turned] - np.pi) < _AS_LONG).sum())

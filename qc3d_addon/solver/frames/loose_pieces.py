@@ -96,7 +96,7 @@ class LoosePieces:
         shorter = np.linalg.norm(sides[0], axis=1) <= np.linalg.norm(sides[1], axis=1)
         apart = np.where(shorter[:, None], sides[0], -sides[1])
         pieces = self._labels[self._faces[pairs, 0]]
-        # Out of the plane, and away from each other's middle: alone, the one turns back at edges, the other slides along.
+        # Out of the plane and away from the other's middle: alone, the one turns back at edges, the other slides along.
         middles = means_by_label(self._labels, shape, count=len(self._sizes))
         away = middles[pieces[:, 0]] - middles[pieces[:, 1]]
         away /= np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]

@@ -30,7 +30,7 @@ class ScrewAnchors:
     """
 
     def __init__(
-        self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints, other_way: Ints
+        self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints, other_way: Ints | tuple[()] = ()
     ) -> None:
         self._key0 = key0
         moves = np.bincount(labels) >= 3

@@ -71,6 +71,8 @@ class SurfacePath:
         Labels of the connected components.
     turning : Turning
         How the triangles of ``deformation`` turn.
+    whole_turn : (3,)
+        Rotation vector of the motion of the whole, which is taken out of the keys; radians.
     half_turned : (p,) int64
         Components that turn by about half a turn as one, which may as well go the other way round.
     """
@@ -83,6 +85,7 @@ class SurfacePath:
         other_way: Ints | None = None,
     ) -> None:
         self._law: StretchLaw = law
+        self.whole_turn = embedding.motion.turn
         self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._apart = None

@@ -24,6 +24,7 @@ SOLVER_FLOORS = (
     ("surface", "collision", "maps"),
     ("fit", "compression"),
     ("frames",),
+    ("combinations",),
     ("steps",),
     ("api",),
 )

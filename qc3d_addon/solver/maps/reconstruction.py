@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map rebuilt from its representation: the 3D linear Beltrami solver (Chen & Lui, section 5).
+"""Reconstruction of a map from its representation (Chen & Lui, sections 5.2 and 5.3).
 
-With A = det(P) P^-2 each coordinate of the map solves div(A grad u) = 0. The three systems share one stiffness matrix
-and differ only in which vertices are held: on the sliding cube u on the faces x = 0 and x = 1, v on y, w on z, and any
-landmarks. The rebuilding of a piecewise linear map is exact up to rounding on the sliding cube, and on any mesh
-whose whole boundary is held.
+With A = det(P) P⁻², each coordinate u of the map solves div(A grad u) = 0. The three systems share one stiffness matrix
+and differ only in their boundary conditions: on the sliding cube u is fixed on the faces x = 0 and x = 1, v on y, w on
+z, and all at landmarks. For a piecewise linear map, the reconstruction is exact up to rounding on the sliding cube and
+on any mesh whose whole boundary is fixed.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ _SETTLED, _MOST_CORRECTIONS = 1e-12, 10
 
 
 def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mapping:
-    """The map of any tetrahedral mesh that has a representation and meets conditions of the caller's choice.
+    """Reconstruct the map with a given representation and boundary conditions.
 
     Parameters
     ----------
     mesh : TetMesh
+        Any tetrahedral mesh.
     stretch : (M, 3, 3)
         Symmetric positive definite matrices, one for each tetrahedron.
     conditions : Conditions
-        Where the map is given.
+        Boundary conditions and landmarks.
 
     Raises
     ------
     ReconstructionError
-        If the sizes do not fit, a stretch is not symmetric and positive definite, a part of the mesh is held too
-        little, or the iteration does not converge.
+        If shapes disagree, a stretch is not symmetric positive definite, the conditions do not determine the map, or
+        the iteration does not converge.
     """
     if stretch.shape != (len(mesh.tets), 3, 3):
         raise ReconstructionError(
@@ -59,19 +60,19 @@ def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mappi
 
 
 class Reconstructor:
-    """Rebuilds maps of one tetrahedral mesh; the sparsity pattern and the held rows are set up once.
+    """Reconstructs maps of one tetrahedral mesh. The sparsity pattern and the boundary rows are set up once.
 
     Parameters
     ----------
     mesh : TetMesh
-        Any tetrahedral mesh; the unit cube where ``held`` is not given.
+        Any tetrahedral mesh; a mesh of the unit cube if ``held`` is omitted.
     held : (N, 3) bool, optional
-        Which coordinates of which vertices are given; those of the sliding cube where it is not given.
+        Which coordinates of which vertices are prescribed; by default those of the sliding cube.
 
     Raises
     ------
     ReconstructionError
-        If a coordinate would be held nowhere.
+        If a coordinate is prescribed nowhere.
     """
 
     def __init__(self, mesh: TetMesh, held: Bools | None = None) -> None:
@@ -84,21 +85,21 @@ class Reconstructor:
         self._unused[mesh.tets] = False
 
     def rebuild(self, stretch: Floats, values: Floats, start: Floats | None = None) -> Floats:
-        """The map whose representation is ``stretch``.
+        """Reconstruct the map whose representation is ``stretch``.
 
         Parameters
         ----------
         stretch : (M, 3, 3)
             Symmetric positive definite matrices.
         values : (N, 3)
-            Read only where a coordinate is held.
+            Prescribed values; other entries are ignored.
         start : (N, 3), optional
-            A guess that shortens the iteration; the identity where it is not given. Vertices of no tetrahedron
-            stay there.
+            Initial guess, the identity by default. Vertices without a tetrahedron stay there.
 
         Returns
         -------
-        (N, 3) values of the map at the mesh's vertices.
+        (N, 3)
+            Values of the map at the mesh's vertices.
 
         Raises
         ------

@@ -102,11 +102,10 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     chain = None if keys is None else Record.read(keys).chain(through)
     if chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
-    stride = chain.intervals // (len(through) - 1)
-    keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
-    steps = sorted(keys)
-    frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
-    return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)
+    # Steps without a key of their own show the Basis.
+    shown = [chain.keys.get(step, obj.data.shape_keys.reference_key.name) for step in range(len(chain.places))]
+    frames = np.stack([key_coordinates(obj, key) for key in shown]).astype(np.float64)
+    return Row(label, triangles(obj.data).astype(np.int64), np.array(chain.places), frames)
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:

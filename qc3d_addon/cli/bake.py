@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 from ..solver.errors import InputError
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 from .options import (
     add_keys,
     add_options,
@@ -37,7 +37,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument(
         "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
     )
-    add_options(command, FrameOptions, FitOptions)
+    add_options(command, FrameOptions, FitOptions, PlayOptions)
     command.set_defaults(run=_run)
 
 
@@ -54,6 +54,7 @@ def _run(arguments: argparse.Namespace) -> None:
         frame_options(arguments),
         arguments.keyframes,
         colliders=arguments.colliders,
+        weights=arguments.weights,
     )
     with StageBars() as bars:
         result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)

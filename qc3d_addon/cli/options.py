@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from ..solver.errors import on_one_line
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 from . import speech
 
 MOST_FRAMES = 10_000
 _HELP = {
     "mode": "how in-betweens are made",
     "easing": "how far along the way the in-betweens are",
+    "weights": "what is played between in-betweens",
     "stretch": "how mode natural interpolates stretches",
     "engine": "what fills the volume around the mesh",
     "quality": "how fine the volume is",
@@ -27,7 +28,7 @@ _HELP = {
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
 
-def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions]) -> None:
+def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions | PlayOptions]) -> None:
     """Add the solver's options: those of the fit, of the frames, or both."""
     for kind in kinds:
         defaults, types = kind(), get_type_hints(kind)

@@ -17,6 +17,9 @@ Quality = Literal["normal", "fine", "finest"]
 StretchLaw = Literal["linear", "logarithmic"]
 WeightKind = Literal["smooth", "hats"]
 
+# Frames between every two keys that a tolerance chooses from.
+DENSE_STEPS = 48
+
 _MOST_TURNS = 100
 
 
@@ -142,7 +145,7 @@ class PlayOptions:
         If a value is of the wrong type or out of its range.
     """
 
-    count: int = 3
+    count: int = 5
     tolerance: float = 0.0
     weights: WeightKind = "smooth"
     also_at: tuple[float, ...] = ()

@@ -26,8 +26,8 @@ def command(figure: bpy.types.Object, tmp_path: Path) -> list[str]:
 def test_it_bakes_a_file(command: list[str], tmp_path: Path) -> None:
     assert cli.run_command([*command, "--mode", "linear"]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
-    made = [key.name for key in bpy.data.objects["Figure"].data.shape_keys.key_blocks if "→" in key.name]
-    assert made == ["Basis→Lean 1/3", "Basis→Lean 2/3", "Basis→Lean 3/3"]
+    made = [key.name for key in bpy.data.objects["Figure"].data.shape_keys.key_blocks if "_to_" in key.name]
+    assert made == ["Basis_to_Lean_33", "Basis_to_Lean_67", "Basis_to_Lean_100"]
 
 
 def test_it_keeps_what_the_panel_showed(command: list[str], figure: bpy.types.Object, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from qc3d_addon.blender.store import kept_measures
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 Shown = Callable[..., np.ndarray]
 
 
@@ -207,7 +207,7 @@ class TestWorstPlace:
         assert len(middle) == 1
         where = shown(baked)[middle[0]] + np.array([1.0, 2.0, 3.0])
         np.testing.assert_allclose(bpy.context.scene.cursor.location, where, atol=1e-5)
-        assert baked.active_shape_key.name == f"{SLIDER} {round(4 * place)}/4"
+        assert baked.active_shape_key.name == f"{SLIDER}_{25 * round(4 * place)}"
         # The worst edge there is as bad as the panel says.
         keys = {key.name: key for key in mesh.shape_keys.key_blocks}
         shapes = {}

@@ -8,12 +8,12 @@ import bpy
 import pytest
 
 from qc3d_addon.blender import compat
-from qc3d_addon.blender.keys import slider
+from qc3d_addon.blender.keys.control import slider_path
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean"
-PATH = slider.data_path(SLIDER)
+SLIDER = "Basis_to_Lean"
+PATH = slider_path(SLIDER)
 
 
 def bake(**choices: object) -> None:
@@ -41,7 +41,7 @@ def test_the_slider_goes_from_the_first_to_the_second_key_at_even_speed(figure: 
         bpy.context.scene.frame_set(frame)
         assert figure[SLIDER] == pytest.approx(value, abs=1e-6)
     bpy.context.scene.frame_set(15)
-    assert figure.data.shape_keys.key_blocks["Basis→Lean 1/2"].value == 1.0
+    assert figure.data.shape_keys.key_blocks["Basis_to_Lean_50"].value == 1.0
 
 
 def test_without_the_request_there_are_none(figure: bpy.types.Object) -> None:

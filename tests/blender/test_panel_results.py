@@ -11,7 +11,7 @@ from qc3d_addon.blender.ui.panel_results import QC3D_PT_results
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean.L"
+SLIDER = "Basis_to_Lean.L"
 
 
 class Button:
@@ -127,7 +127,7 @@ def test_a_mirror_image_is_made_again_from_the_other_side(even: bpy.types.Object
     assert {f"Mirrored from {SLIDER}", "2 in-betweens"} < set(layout.texts)
     first = layout.buttons[0]  # the newest is on top
     assert (first[0], first[1].slider) == ("mirror", SLIDER)  # type: ignore[attr-defined]
-    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis→Lean.R"]  # type: ignore[attr-defined]
+    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis_to_Lean.R"]  # type: ignore[attr-defined]
     assert "mirror" not in of_the_image
     assert "rebake" not in of_the_image
 

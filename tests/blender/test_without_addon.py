@@ -24,7 +24,7 @@ assert not hasattr(bpy.types, "QC3D_PT_inbetweens")
 obj = bpy.data.objects["Figure"]
 shown = []
 for value in (0.0, 0.3, 0.5, 1.0):
-    obj["Basis→Lean"] = value
+    obj["Basis_to_Lean"] = value
     obj.update_tag()
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
@@ -44,7 +44,7 @@ def test_a_baked_file_plays_without_the_addon_and_comes_back(figure: bpy.types.O
     names, record = keys.key_blocks.keys(), Record.read(keys)
     kept = {name: bytes(value) for name, value in keys.items() if isinstance(value, bytes)}
     figure.animation_data_clear()  # the slider is set by hand below
-    expected = [shown(figure, **{"Basis→Lean": value}) for value in (0.0, 0.3, 0.5, 1.0)]
+    expected = [shown(figure, Basis_to_Lean=value) for value in (0.0, 0.3, 0.5, 1.0)]
     path = tmp_path / "baked.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
 

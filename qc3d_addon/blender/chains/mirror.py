@@ -46,7 +46,7 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
     if through == chain.through:
-        through = (*through[:-1], f"{through[-1]} mirrored")
+        through = (*through[:-1], f"{through[-1]}_mirrored")
     mirrored = record.chain(through)
     if mirrored is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
@@ -57,7 +57,8 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
             f"'{mirrored.slider}' was baked from keys of its own; remove it before it is made from '{chain.slider}'."
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
-    with shape_keys.chain_written(obj, mirrored, shapes, chain.intervals, None) as (undo, _):
+    places = shape_keys.Steps(chain.places, chain.corners)
+    with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:

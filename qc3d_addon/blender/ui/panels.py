@@ -75,7 +75,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     header.label(text="Advanced")
     if advanced is not None:
         choices = advanced.column()
-        for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
+        for name in ("weights", "easing", "stretch", "extra_turns", "engine", "seed"):
             choices.prop(settings, name)
         advanced.operator_context = IN_THE_SIDEBAR
         row = advanced.row(align=True)

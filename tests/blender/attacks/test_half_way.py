@@ -190,7 +190,7 @@ def test_a_mirror_image(baked: bpy.types.Object, state: State) -> None:
     assert stop_everywhere(lambda: mirror.mirror_chain(baked, *chain_of(baked)), state) > 50
     heat_map.show(baked, chain_of(baked)[1], "volume")
     record = Record.read(baked.data.shape_keys)
-    baked.data.shape_keys.key_blocks["Basis→Lean 1/3"].points[0].co.z += 0.25
+    baked.data.shape_keys.key_blocks["Basis_to_Lean_33"].points[0].co.z += 0.25
     assert stop_everywhere(lambda: mirror.mirror_chain(baked, record, record.chains[0]), state) > 50
 
 

@@ -19,7 +19,7 @@ from ..test_panel_results import drawn
 pytestmark = pytest.mark.usefixtures("quick_map")
 
 MANY = 10_000
-SLIDER = "Basis→Key 9000"
+SLIDER = "Basis_to_Key 9000"
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def test_as_many_steps_as_there_can_be(figure: bpy.types.Object, shown: Callable
     assert bpy.ops.qc3d.heat_map() == {"FINISHED"}
     assert bpy.ops.qc3d.absolute_keys() == {"FINISHED"}
     copy = bpy.data.objects["Figure absolute"]
-    expected = shown(figure, **{"Basis→Lean": 0.5})
+    expected = shown(figure, Basis_to_Lean=0.5)
     np.testing.assert_allclose(shown(copy), expected, atol=1e-5)
     assert bpy.ops.qc3d.remove() == {"FINISHED"}
     assert len(figure.data.shape_keys.key_blocks) == 3

@@ -24,7 +24,7 @@ from ..test_panel_results import Context, drawn
 pytestmark = pytest.mark.usefixtures("quick_map")
 
 State = Callable[[], dict[str, Any]]
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 OPERATORS = (
     "rebake",
     "live_scrub",

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import compat, live_scrub
-from qc3d_addon.blender.keys import shape_keys, slider
+from qc3d_addon.blender.keys import drivers, shape_keys
+from qc3d_addon.blender.keys.control import slider_path
 from qc3d_addon.blender.store.records import Record
 
 from ..test_panel_results import drawn
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("quick_map")
 
 Shown = Callable[..., np.ndarray]
 State = Callable[[], dict[str, Any]]
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 NOT_A_NUMBER = f"The slider '{SLIDER}' of 'Figure' is not a number any more; delete that custom property, then re-bake"
 DELETED = f"The slider '{SLIDER}' was deleted; re-bake it first."
 
@@ -192,12 +193,15 @@ class TestNaN:
 def test_a_driver_that_reads_something_else_than_an_object(baked: bpy.types.Object) -> None:
     """As another add-on or a script may leave it: the slider is then that of the mesh's object."""
     (chain,) = Record.read(baked.data.shape_keys).chains
-    for driver in slider.driven_by(baked.data.shape_keys, SLIDER).values():
-        target = driver.variables[0].targets[0]
+    for curve in drivers.driven_by(baked.data.shape_keys, slider_path(SLIDER)).values():
+        target = curve.driver.variables[0].targets[0]
         target.id_type = "SCENE"
         target.id = bpy.context.scene
-    assert shape_keys.slider_owner(baked, chain) == baked
+    assert shape_keys.control_of(baked, chain).owner == baked
     drawn(baked)
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
-    (owner,) = {d.variables[0].targets[0].id for d in slider.driven_by(baked.data.shape_keys, SLIDER).values()}
+    (owner,) = {
+        curve.driver.variables[0].targets[0].id
+        for curve in drivers.driven_by(baked.data.shape_keys, slider_path(SLIDER)).values()
+    }
     assert owner == baked

@@ -89,7 +89,8 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     """The user's own keys and the in-betweens that were baked between them."""
     import bpy
 
-    from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+    from qc3d_addon.blender.keys.shape_keys import step_shapes
+    from qc3d_addon.blender.store.mesh_data import triangles
     from qc3d_addon.blender.store.records import Record
 
     require_file(path)
@@ -99,12 +100,11 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
         raise InputError(f"{path} cannot be opened; it must be a .blend file this Blender can read.") from error
     obj = bpy.data.objects.get(name)
     keys = getattr(obj and obj.data, "shape_keys", None)
-    chain = None if keys is None else Record.read(keys).chain(through)
+    chains = [] if keys is None else Record.read(keys).chains
+    chain = next((chain for chain in chains if chain.through == through), None)
     if chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
-    # Steps without a key of their own show the Basis.
-    shown = [chain.keys.get(step, obj.data.shape_keys.reference_key.name) for step in range(len(chain.places))]
-    frames = np.stack([key_coordinates(obj, key) for key in shown]).astype(np.float64)
+    frames = step_shapes(obj, chain)
     return Row(label, triangles(obj.data).astype(np.int64), np.array(chain.places), frames)
 
 

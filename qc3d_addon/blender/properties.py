@@ -142,6 +142,17 @@ class BakeChoices(MapChoices):
         description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
         options={'SKIP_SAVE'},
     )
+    play_on: EnumProperty(
+        name="Play On",
+        description="What plays the in-betweens",
+        items=[
+            ("auto", "Auto", "The last key's own value where it can be, else a slider"),
+            ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
+            ("slider", "Slider", "A slider of their own, a custom property of the object"),
+        ],
+        default="auto",
+        options={'SKIP_SAVE'},
+    )
     mode: _choice("mode", "How the map between the keys is interpolated")
     easing: _choice("easing", "How the speed from the first key to the last changes")
     use_keyframes: BoolProperty(
@@ -228,5 +239,6 @@ def bake_request(choices: BakeChoices) -> BakeRequest:
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
         tolerance=choices.tolerance if choices.use_tolerance else 0.0,
         weights=choices.weights,
+        play_on=choices.play_on,
         colliders=choices.colliders,
     )

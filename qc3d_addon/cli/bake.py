@@ -35,6 +35,12 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         help="animate the slider over these frames",
     )
     command.add_argument(
+        "--play-on",
+        choices=("auto", "key", "slider"),
+        default="auto",
+        help="what plays them: the last key's own value, or a slider of their own (default: the key where it can be)",
+    )
+    command.add_argument(
         "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
     )
     add_options(command, FrameOptions, FitOptions, PlayOptions)
@@ -55,6 +61,7 @@ def _run(arguments: argparse.Namespace) -> None:
         arguments.keyframes,
         colliders=arguments.colliders,
         weights=arguments.weights,
+        play_on=arguments.play_on,
     )
     with StageBars() as bars:
         result = bake_file(arguments.file, arguments.object, request, arguments.output, arguments.report, bars)

@@ -23,7 +23,9 @@ NAMES = ["Basis_to_Lean_25", "Basis_to_Lean_50", "Basis_to_Lean_75", "Basis_to_L
 
 
 def bake(from_key: str = "Basis", to_key: str = "Lean", mode: str = 'linear', **choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key=from_key, to_key=to_key, mode=mode, **choices) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key=from_key, to_key=to_key, mode=mode, **choices
+    ) == {'FINISHED'}
 
 
 def displayed(basis: np.ndarray, key: np.ndarray) -> np.ndarray:
@@ -279,7 +281,7 @@ class TestSlider:
         from qc3d_addon.blender.bake.run import bake_object
 
         figure.data.shape_keys.key_blocks["Lean"].value = 0.5
-        result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1))
+        result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, play_on="slider"))
         assert any("'Lean' is on by itself (0.50)" in note for note in result.notes)
 
 
@@ -289,7 +291,7 @@ def test_what_the_caller_leaves_out_comes_from_the_panel(figure: bpy.types.Objec
     figure.qc3d.count, figure.qc3d.quality, figure.qc3d.engine = 2, 'finest', 'delaunay'
     assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
     assert "Lean_to_Stretch_33" in figure.data.shape_keys.key_blocks
-    bpy.ops.qc3d.bake_inbetweens(count=1, quality='normal')
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", count=1, quality='normal')
     assert "Lean_to_Stretch_50" in figure.data.shape_keys.key_blocks
     assert [(call.quality, call.engine) for call in quick_map] == [('finest', 'delaunay'), ('normal', 'delaunay')]
 

@@ -30,7 +30,9 @@ def bake(*names: str, **choices: object) -> None:
     first, *inner, last = names or ("Basis", "Lean", "Stretch")
     via = [{"name": name} for name in inner]
     choices = {"mode": 'linear', "count": 1, **choices}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key=first, via=via, to_key=last, **choices) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key=first, via=via, to_key=last, **choices
+    ) == {'FINISHED'}
 
 
 def made(shapes: Shapes) -> list[str]:
@@ -198,7 +200,7 @@ class TestPanel:
 
     def test_who_names_the_ends_means_the_keys_between_as_given(self, figure: bpy.types.Object) -> None:
         figure.qc3d.via.add().name = "Lean"
-        assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch") == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Stretch") == {'FINISHED'}
         assert "Basis_to_Stretch" in figure
 
     def test_every_setting_reaches_the_solver(self, figure: bpy.types.Object, quick_map: list[FitOptions]) -> None:

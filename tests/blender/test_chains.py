@@ -41,7 +41,9 @@ OPERATORS = (
 
 
 def bake(to_key: str = "Lean", **choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key=to_key, mode="linear", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key=to_key, mode="linear", **choices
+    ) == {"FINISHED"}
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -276,7 +278,7 @@ class TestAbsoluteKeys:
         assert not [name for name in (*copy.keys(), *copy.data.shape_keys.keys()) if "qc3d" in name]
 
     def test_where_no_step_is_the_basis(self, figure: bpy.types.Object, shown: Shown) -> None:
-        bpy.ops.qc3d.bake_inbetweens(from_key="Lean", to_key="Stretch", mode="linear", count=2)
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Lean", to_key="Stretch", mode="linear", count=2)
         bpy.ops.qc3d.absolute_keys()
         copy = bpy.data.objects["Figure absolute"]
         for place in (0.0, 0.5, 1.0):

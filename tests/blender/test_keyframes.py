@@ -18,7 +18,7 @@ PATH = slider_path(SLIDER)
 
 def bake(**choices: object) -> None:
     pair = {"from_key": "Basis", "to_key": "Lean"}
-    assert bpy.ops.qc3d.bake_inbetweens(**pair, count=1, mode='linear', **choices) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", **pair, count=1, mode='linear', **choices) == {'FINISHED'}
 
 
 def keyframes(obj: bpy.types.Object) -> list[tuple[float, float]]:
@@ -72,7 +72,7 @@ def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     bake()
     figure[SLIDER] = 0.25
     figure.keyframe_insert(PATH, frame=7)
-    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11)))
+    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11), play_on="slider"))
     assert keyframes(figure) == [(7.0, 0.25)]
     assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
 

@@ -28,7 +28,7 @@ ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
 
 @pytest.fixture
 def baked(figure: bpy.types.Object) -> bpy.types.Object:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=1) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=1) == {"FINISHED"}
     figure.active_shape_key_index = 1
     return figure
 
@@ -63,7 +63,7 @@ def test_it_shows_what_a_dense_bake_shows(baked: bpy.types.Object, shown: Shown,
     assert bpy.ops.qc3d.live_scrub() == {"FINISHED"}
     expect_nothing_left(baked, before)
     np.testing.assert_array_equal(shown(baked, **{SLIDER: 0.25}), coarse)
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=19)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=19)
     for place, found in seen.items():
         assert np.abs(found - shapes(baked)[f"{SLIDER}_{5 * round(20 * place):02d}"]).max() < 1e-4
 
@@ -71,14 +71,14 @@ def test_it_shows_what_a_dense_bake_shows(baked: bpy.types.Object, shown: Shown,
 @pytest.mark.parametrize("easing", ["linear", "ease-in-out"])
 def test_a_chain_with_any_easing(figure: bpy.types.Object, shown: Shown, easing: str) -> None:
     through = {"from_key": "Basis", "via": [{"name": "Stretch"}], "to_key": "Lean", "easing": easing}
-    bpy.ops.qc3d.bake_inbetweens(count=1, **through)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", count=1, **through)
     bpy.ops.qc3d.live_scrub()
     name = "Basis_to_Stretch_to_Lean"
     seen = {}
     for place in (0.15, 0.4, 0.5, 0.55, 0.9):
         drag(figure, place, name)
         seen[place] = shown(figure)
-    bpy.ops.qc3d.bake_inbetweens(count=9, **through)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", count=9, **through)
     for place, found in seen.items():
         assert np.abs(found - shown(figure, **{name: place})).max() < 1e-4
 
@@ -94,7 +94,7 @@ def test_other_keys_and_sculpted_inbetweens_still_show(baked: bpy.types.Object, 
 
 
 def test_playing_the_animation_shows_it(baked: bpy.types.Object, shown: Shown) -> None:
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=1, use_keyframes=True)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=1, use_keyframes=True)
     bpy.ops.qc3d.live_scrub()
     drag(baked, 0.25)
     expected = shown(baked)
@@ -141,7 +141,7 @@ def test_other_work_ends_it(baked: bpy.types.Object, operator: str) -> None:
 
 
 def test_another_slider_takes_over(baked: bpy.types.Object) -> None:
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch", count=1)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Stretch", count=1)
     bpy.ops.qc3d.live_scrub(slider=SLIDER)
     bpy.ops.qc3d.live_scrub(slider="Basis_to_Stretch")
     assert live_scrub.is_on(baked, "Basis_to_Stretch")

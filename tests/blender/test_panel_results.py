@@ -83,7 +83,9 @@ def even() -> bpy.types.Object:
         for point in key.points:
             point.co.x += lean * max(point.co.z, 0.0) ** 2
     assert not QC3D_PT_results.poll(Context(obj))
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean.L", mode="linear", count=2) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean.L", mode="linear", count=2
+    ) == {"FINISHED"}
     return obj
 
 

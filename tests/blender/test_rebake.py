@@ -20,7 +20,9 @@ SLIDER = "Basis_to_Lean"
 
 
 def bake(to_key: str = "Lean", **choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key=to_key, mode='linear', **choices) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key=to_key, mode='linear', **choices
+    ) == {'FINISHED'}
 
 
 def delete(obj: bpy.types.Object, name: str) -> None:

@@ -25,7 +25,7 @@ ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
 @pytest.fixture
 def baked(figure: bpy.types.Object) -> bpy.types.Object:
     choices = {"mode": "linear", "count": 2, "easing": "ease-in", "seed": 7, "use_keyframes": True}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
     return figure
 
 
@@ -72,7 +72,7 @@ def test_the_choices_are_those_of_the_bake_and_not_of_the_panel(baked: bpy.types
 
 
 def test_the_one_that_is_named_or_the_newest(baked: bpy.types.Object, shapes: ReadShapes) -> None:
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch", mode="linear", count=1)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Stretch", mode="linear", count=1)
     before = shapes(baked)
     for name in ("Lean", "Stretch"):
         baked.data.shape_keys.key_blocks[name].points[0].co.x += 0.5
@@ -94,7 +94,9 @@ def test_a_record_of_an_older_version(baked: bpy.types.Object, state: State) -> 
     with pytest.raises(RuntimeError, match="not known any more; bake anew"):
         bpy.ops.qc3d.rebake()
     assert state() == before
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="linear", count=2) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean", mode="linear", count=2
+    ) == {"FINISHED"}
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
 
 
@@ -114,7 +116,7 @@ def test_a_chain_again_after_any_of_its_keys_was_sculpted(
     figure: bpy.types.Object, shapes: ReadShapes, quick_map: list[Any], key: str
 ) -> None:
     way = {"from_key": "Basis", "via": [{"name": "Lean"}], "to_key": "Stretch"}
-    bpy.ops.qc3d.bake_inbetweens(**way, mode="linear", count=1, use_keyframes=True)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", **way, mode="linear", count=1, use_keyframes=True)
     slider = "Basis_to_Lean_to_Stretch"
     curve = compat.find_fcurve(figure, f'["{slider}"]')
     assert curve is not None

@@ -44,6 +44,7 @@ def bar() -> bpy.types.Object:
 
 def bake(tolerance: float) -> None:
     found = bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Bent", use_tolerance=True, tolerance=tolerance, engine='delaunay',
         quality='normal',
     )  # fmt: skip
@@ -71,6 +72,7 @@ def test_smaller_tolerances_need_more_and_both_are_kept(bar: bpy.types.Object, s
     few, weights = shapes(bar), chain.weights
     # What the few play is near what a bake of all has.
     bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Bent", count=DENSE_STEPS - 1, engine="delaunay", quality="normal"
     )
     dense = shapes(bar)
@@ -116,7 +118,7 @@ def bake_through(*names: str, **choices: object) -> Chain:
     way = {"from_key": names[0], "via": [{"name": name} for name in names[1:-1]], "to_key": names[-1]}
     # Straight ways at a changing speed, which even steps of the slider show the better the more there are.
     smooth = {"mode": "linear", "easing": "ease-in-out"}
-    assert bpy.ops.qc3d.bake_inbetweens(**way, **smooth, **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", **way, **smooth, **choices) == {"FINISHED"}
     chain = Record.read(bpy.context.active_object.data.shape_keys).chain(names)
     assert chain is not None
     return chain

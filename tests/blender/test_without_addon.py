@@ -38,7 +38,7 @@ print("FOUND" + json.dumps([shown, invalid, list(obj.data.shape_keys.key_blocks.
 
 @pytest.mark.usefixtures("quick_map")
 def test_a_baked_file_plays_without_the_addon_and_comes_back(figure: bpy.types.Object, shown, tmp_path: Path) -> None:  # noqa: ANN001
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=3, use_keyframes=True)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=3, use_keyframes=True)
     bpy.ops.qc3d.heat_map(measure='stretch')
     keys = figure.data.shape_keys
     names, record = keys.key_blocks.keys(), Record.read(keys)

@@ -81,6 +81,7 @@ def _bake(engine: str) -> dict[str, object]:
         point.co.x += 0.4 * max(point.co.z, 0.0) ** 2
     start = time.perf_counter()
     status = bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Lean", count=2, quality='normal', engine=engine, use_keyframes=False
     )
     seconds = time.perf_counter() - start

@@ -141,7 +141,7 @@ lean.points.foreach_set('co', (rest + np.maximum(rest[:, 2:], 0) ** 2 * np.float
 arm().hide_set(True)
 view()[1].spaces.active.shading.type = 'SOLID'
 with inside('WINDOW'):
-    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=3, quality='normal', engine='delaunay')
+    bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Lean', count=3)
 
 class Drag:
     '''Moves the slider a little between redraws, and notes where it is and what is shown at each.'''
@@ -181,7 +181,7 @@ Drag.watched = int(np.argmax(rest[:, 2] - abs(rest[:, 1]) + 0.5 * rest[:, 0]))
     window.ask(
         """
 with inside('WINDOW'):
-    bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Lean', count=99, quality='normal', engine='delaunay')
+    bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Lean', count=99)
 keys = ball.data.shape_keys.key_blocks
 """
     )

@@ -23,6 +23,7 @@ for name, lean in (('Basis', 0.0), ('Lean', 0.4), ('Tilt', -0.3)):
     key.value = 0.0
     for point in key.points:
         point.co.x += lean * max(point.co.z, 0.0) ** 2
+ball.qc3d.play_on = 'slider'
 ball.qc3d.from_key, ball.qc3d.to_key, ball.qc3d.count = 'Basis', 'Lean', 2
 
 def points_of(key):

@@ -19,6 +19,7 @@ from ...solver.errors import InputError
 from ..keys import shape_keys
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
+from ..store.renames import digest
 from ..store.summaries import Summary
 from . import bookkeeping, colliders
 from .request import PREVIEW_STEPS, BakeRequest, BakeResult
@@ -73,7 +74,8 @@ class Plan:
             raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
         checks.require_object(obj)
         try:
-            pairs = mesh_data.read_pairs(obj, self.request.keys)
+            checks.require_control(obj.data.shape_keys, self.request.keys, self.request.base)
+            pairs = mesh_data.read_pairs(obj, self.request.keys, self.request.base)
         except InputError as error:
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. {error}") from error
         if not all(_same(pair, self.task.pairs[ends]) for ends, pair in pairs.items()):
@@ -112,7 +114,12 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     obj = checks.require_object(obj)
     keys = obj.data.shape_keys
     record = Record.read(keys)
-    pairs = mesh_data.read_pairs(obj, request.keys)
+    checks.require_keys(keys, request.keys)
+    if request.play_on == "auto":
+        on_key = checks.control_problem(keys, request.keys, request.keys[0]) is None
+        request = replace(request, play_on="key" if on_key else "slider")
+    checks.require_control(keys, request.keys, request.base)
+    pairs = mesh_data.read_pairs(obj, request.keys, request.base)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
     play = request.play_options
@@ -199,13 +206,19 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
     steps = shape_keys.Steps(tuple(bake.times.tolist()), tuple(played.corners))
-    shapes = shape_keys.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
+    if chain.on_key:
+        shapes = shape_keys.offsets_by_step(obj, steps.places, bake.frames)
+    else:
+        shapes = shape_keys.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
 
     with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
-        owner = shape_keys.control_of(obj, chain).owner.name
+        control = shape_keys.control_of(obj, chain)
+        owner = obj.name if control.is_key else control.owner.name
         notes = [*plan.notes, *bake.report.notes, *said]
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
-        notes += _values_that_add(keys, request)
+        notes += [] if control.is_key else _values_that_add(keys, request)
+        if obj.show_only_shape_key:
+            notes.append(f"'{obj.name}' shows its active key only; unpin that to see the in-betweens play.")
         report = {
             "object": obj.name,
             "from": request.keys[0],
@@ -214,17 +227,19 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
             "count": len(steps.places) - len(request.keys),
             "places": list(steps.places),
             "keys": list(chain.keys.values()),
-            "slider": chain.slider,
+            "slider": control.name,
+            "on_key": chain.on_key,
             "slider_object": owner,
             **bake.report.as_json(),
             "notes": notes,
         }
         chain.request, chain.mirror_of = request.remembered(), ""
+        chain.digests = tuple(digest(keys.key_blocks[name]) for name in request.keys)
         chain.result = Summary.of_report(bake.report, steps.places, notes)
         record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
         _keep_maps(keys, record, plan, outcome, undo)
         bookkeeping.remember(obj, record, chain, bake.measures, undo)
-        result = BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
+        result = BakeResult(control.name, owner, tuple(chain.keys.values()), tuple(notes), report)
     return result
 
 
@@ -246,11 +261,13 @@ def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
     """The entry of these keys in the record, made where there is none."""
-    chain = record.chain(request.keys)
+    on_key = request.keys[-1] if request.play_on == "key" else ""
+    chain = record.chain_on_key(on_key) if on_key else record.chain(request.keys)
     if chain is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
-        chain = Chain(request.keys, names.chain_label(request.keys, taken))
+        chain = Chain(request.keys, names.chain_label((on_key,) if on_key else request.keys, taken), on_key=on_key)
         record.chains.append(chain)
+    chain.through = request.keys
     return chain
 
 

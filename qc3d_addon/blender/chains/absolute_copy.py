@@ -14,7 +14,7 @@ from .. import compat
 from ..heat_map import heat_map
 from ..keys import drivers, shape_keys
 from ..store import names
-from ..store.mesh_data import key_coordinates, set_key_coordinates
+from ..store.mesh_data import set_key_coordinates
 from ..store.records import Chain
 
 _LEAST_STEPS = 24  # straight blends of so many miss a turn by 90 degrees by 0.05 % of the radius
@@ -31,14 +31,9 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
     InputError
         If a generated key was deleted, or the slider cannot play anything; nothing was made.
     """
-    keys = obj.data.shape_keys
     control = shape_keys.control_of(obj, chain)
     control.require()
-    steps = shape_keys.all_owned_keys(keys, chain)
-    rest = key_coordinates(obj, keys.reference_key.name)
-    shapes = np.stack(
-        [key_coordinates(obj, steps[step].name) if step in steps else rest for step in range(chain.intervals + 1)]
-    )
+    shapes = shape_keys.step_shapes(obj, chain)
     is_smooth = len(chain.corners) < chain.intervals - 1
     places = _denser(chain.places) if is_smooth else np.array(chain.places)
     shapes = np.where(

@@ -42,11 +42,15 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         scene.collection.children.link(collection)
         collection.objects.link(copy)
         copy.animation_data_clear()
-        copy[chain.slider] = 0.0
-        for driven in drivers.driven_by(copy.data.shape_keys, control.path).values():
-            if drivers.reads(driven.driver, control):
-                drivers.read(driven.driver, control.of(copy))
-        curve = compat.ensure_fcurve(copy, control.path, undo)
+        played = control.of(copy.data.shape_keys if control.is_key else copy)
+        if control.is_key:
+            copy.data.shape_keys.driver_remove(control.path)
+        else:
+            copy[chain.slider] = 0.0
+            for driven in drivers.driven_by(copy.data.shape_keys, control.path).values():
+                if drivers.reads(driven.driver, control):
+                    drivers.read(driven.driver, played)
+        curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))

@@ -42,7 +42,7 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
 def remove_slider(control: Control, chain: Chain) -> list[str]:
     """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
     owner = control.owner
-    if chain.slider not in owner:
+    if control.is_key or not control.is_there:  # a key is the user's own
         return []
     if not control.is_number:
         return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]

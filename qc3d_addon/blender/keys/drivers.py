@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import compat
-from .control import Control, value_path
+from .control import Control, mute_path, value_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -39,21 +39,33 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     before, after = np.append(width[0], width), np.append(width, width[-1])
     left = np.column_stack([knots - before, values - before * slopes[0]])
     right = np.column_stack([knots + after, values + after * slopes[1]])
-    _set_curve(curve, np.column_stack([knots, values]), left, right)
+    _set_curve(curve, np.column_stack([knots, values]), left, right, 'BEZIER')
     curve.extrapolation = 'LINEAR'
+
+
+def drive_mute(key: bpy.types.ShapeKey, control: Control) -> None:
+    """Let a key be muted together with the one that plays it."""
+    keys, path = key.id_data, mute_path(key.name)
+    curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
+    if curve is None:
+        curve = compat.new_driver(keys, path)
+    _read_path(curve.driver, control, mute_path(control.name))
 
 
 def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike, values: ArrayLike) -> None:
     """Let a new driver go straight through values (k,) at places (k,) of the control, and stay at them at the ends."""
     read(curve.driver, control)
     points = np.column_stack([places, values])
-    third = np.diff(points, axis=0) / 3.0
-    _set_curve(curve, points, points - np.vstack([third[:1], third]), points + np.vstack([third, third[-1:]]))
+    _set_curve(curve, points, points, points, 'LINEAR')
     curve.extrapolation = 'CONSTANT'
 
 
 def read(driver: bpy.types.Driver, control: Control) -> None:
     """Let a driver have the control as its only variable, and its value."""
+    _read_path(driver, control, control.path)
+
+
+def _read_path(driver: bpy.types.Driver, control: Control, path: str) -> None:
     driver.type = 'AVERAGE'
     driver.expression = ""
     while len(driver.variables) > 1:
@@ -64,7 +76,7 @@ def read(driver: bpy.types.Driver, control: Control) -> None:
     target = variable.targets[0]
     target.id_type = control.id_type
     target.id = control.owner
-    target.data_path = control.path
+    target.data_path = path
     driver.is_valid = True  # Blender stops a driver for good where its variable was NaN once
 
 
@@ -80,10 +92,11 @@ def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
 
 
 def undrive(key: bpy.types.ShapeKey) -> None:
-    """Remove the driver of a shape key's value, if it has one."""
-    keys, path = key.id_data, value_path(key.name)
-    if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
-        keys.driver_remove(path)
+    """Remove the drivers of a shape key, if it has any."""
+    keys = key.id_data
+    for path in (value_path(key.name), mute_path(key.name)):
+        if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
+            keys.driver_remove(path)
 
 
 def driver_of(keys: bpy.types.Key, key_name: str, path: str) -> bpy.types.Driver | None:
@@ -123,6 +136,7 @@ def _set_curve(
     points: NDArray[np.float64],
     left: NDArray[np.float64],
     right: NDArray[np.float64],
+    interpolation: str,
 ) -> None:
     """Make a curve anew of points (k, 2) with handles (k, 2) on either side."""
     while curve.modifiers:
@@ -131,7 +145,7 @@ def _set_curve(
     frames.clear()
     frames.add(len(points))
     kinds = bpy.types.Keyframe.bl_rna.properties
-    for name, kind in (("interpolation", 'BEZIER'), ("handle_left_type", 'FREE'), ("handle_right_type", 'FREE')):
+    for name, kind in (("interpolation", interpolation), ("handle_left_type", 'FREE'), ("handle_right_type", 'FREE')):
         frames.foreach_set(name, [kinds[name].enum_items[kind].value] * len(points))
     for name, places in (("co", points), ("handle_left", left), ("handle_right", right)):
         frames.foreach_set(name, places.ravel())

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 import numpy as np
@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError, QC3DError
 from ..store import names
-from ..store.mesh_data import key_coordinates, set_key_coordinates
+from ..store.mesh_data import key_coordinates, set_key_coordinates, shown_coordinates
 from ..store.records import LEAST_DISTANCE, Chain
 from . import drivers, slider
-from .control import Control, slider_path, value_path
+from .control import Control, path_of, value_path
+
+if TYPE_CHECKING:
+    from ...solver.frames.weights import Weights
 
 
 class Steps(NamedTuple):
@@ -34,7 +37,7 @@ def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKe
     mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver. A key that
     was moved to the top, where all others refer to it, is the animator's own from then on.
     """
-    curves = drivers.driven_by(keys, slider_path(chain.slider))
+    curves = drivers.driven_by(keys, path_of(chain))
     curves.pop(value_path(keys.reference_key.name), None)
     owned, missing = {}, []
     for step, name in chain.keys.items():
@@ -61,7 +64,12 @@ def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.Sha
 
 
 def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
-    """What plays the chain: the slider on the object of an earlier bake (objects may share a mesh), else on ``obj``."""
+    """What plays the chain: a key's value, or its slider.
+
+    The slider is that on the object of an earlier bake (objects may share a mesh), else that on ``obj``.
+    """
+    if chain.on_key:
+        return Control(obj.data.shape_keys, chain.on_key)
     for driver in _drivers(obj.data.shape_keys, chain):
         owner = driver.variables[0].targets[0].id
         if isinstance(owner, bpy.types.Object):
@@ -77,14 +85,14 @@ def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
 
 def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
     """Start drivers again that Blender has stopped."""
-    for curve in drivers.driven_by(keys, slider_path(chain.slider)).values():
+    for curve in drivers.driven_by(keys, path_of(chain)).values():
         curve.driver.is_valid = True
     keys.update_tag()
 
 
 def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
     """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
-    path = slider_path(chain.slider)
+    path = path_of(chain)
     for name in chain.keys.values():
         driver = drivers.driver_of(keys, name, path)
         if driver is not None:
@@ -102,7 +110,7 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
         linked.
     """
     control = _require_unlocked(obj, chain)
-    if chain.slider in control.owner:
+    if control.is_there:
         control.require()
     if keyframes is not None:
         require_action(control.owner)
@@ -143,7 +151,7 @@ def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> Control:
 def shapes_by_step(
     obj: bpy.types.Object, met: dict[int, str], frames: NDArray[np.float64]
 ) -> dict[int, NDArray[np.float32]]:
-    """The shapes of a chain that need a shape key: every frame but the Basis, which shows where no key is on.
+    """The shapes that a slider of its own needs keys for: every frame but the Basis, which shows where no key is on.
 
     Parameters
     ----------
@@ -161,6 +169,70 @@ def shapes_by_step(
     QC3DError
         If the frames are not finite positions of the mesh's vertices.
     """
+    shapes = dict(enumerate(_rounded(obj, frames)))
+    for step, name in met.items():
+        if name == obj.data.shape_keys.reference_key.name:
+            del shapes[step]
+        else:
+            shapes[step] = shown_coordinates(obj, name)
+    return shapes
+
+
+def offsets_by_step(
+    obj: bpy.types.Object, places: tuple[float, ...], frames: NDArray[np.float64]
+) -> dict[int, NDArray[np.float32]]:
+    """What keys that a key's own value plays add to it: at each step, what its frame has beyond the straight blend.
+
+    Parameters
+    ----------
+    places
+        Of the steps, as values of the key.
+    frames
+        (k, n, 3) positions at them, from what the key is relative to up to the key.
+
+    Returns
+    -------
+    (n, 3) float32 by step, absolute positions for keys that are relative to what that key is relative to.
+
+    Raises
+    ------
+    QC3DError
+        If the frames are not finite positions of the mesh's vertices.
+    """
+    at = np.array(places)[:, None, None]
+    offsets = _rounded(obj, frames - at * (frames[-1] - frames[0]))
+    return {step: offsets[step] for step in range(1, len(places) - 1)}
+
+
+def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
+    """(k, n, 3) what a chain's control shows at each of its steps, whatever was sculpted since.
+
+    Raises
+    ------
+    InputError
+        If keys of the chain are missing.
+    """
+    keys = obj.data.shape_keys
+    owned = all_owned_keys(keys, chain)
+    first = key_coordinates(obj, base_key(keys, chain).name).astype(np.float64)
+    # What the key itself adds where its own value plays the chain.
+    whole = shown_coordinates(obj, chain.on_key) - first if chain.on_key else np.zeros_like(first)
+    return np.stack(
+        [
+            (key_coordinates(obj, owned[step].name) if step in owned else first) + place * whole
+            for step, place in enumerate(chain.places)
+        ]
+    )
+
+
+def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:
+    """What the chain's keys are relative to: that of the key that plays them, or the Basis."""
+    key = keys.key_blocks.get(chain.on_key) if chain.on_key else None
+    return keys.reference_key if key is None else key.relative_key
+
+
+def _rounded(obj: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Frames (k, n, 3) as shape keys hold them; raises QC3DError where they cannot."""
     if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
         raise QC3DError(
             f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
@@ -169,13 +241,7 @@ def shapes_by_step(
         rounded = frames.astype(np.float32)
     if not np.isfinite(rounded).all():
         raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")
-    shapes = dict(enumerate(rounded))
-    for step, name in met.items():
-        if name == obj.data.shape_keys.reference_key.name:
-            del shapes[step]
-        else:
-            shapes[step] = key_coordinates(obj, name)
-    return shapes
+    return np.asarray(rounded)
 
 
 @contextmanager
@@ -198,7 +264,7 @@ def chain_written(
     chain
         The record of the chain, which is brought up to date.
     shapes
-        (n, 3) float32 absolute positions by step; steps left out show the Basis.
+        (n, 3) float32 absolute positions by step; steps left out need no key.
     steps
         Where the steps are.
     keyframes
@@ -215,6 +281,7 @@ def chain_written(
     """
     require_writable(obj, chain, keyframes)
     keys, control = obj.data.shape_keys, control_of(obj, chain)
+    base = base_key(keys, chain)
     owned = owned_keys(keys, chain)
     kept = _kept(chain, owned, steps.places, shapes)
     stale = [key for key in owned.values() if key not in kept.values()]
@@ -222,9 +289,10 @@ def chain_written(
     curve, notes = None, []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
-        # A slider that starts where it shows the Basis leaves the object looking as it did.
-        start = min(set(range(len(steps.places))) - shapes.keys(), default=0)
-        slider.ensure_property(control.owner, chain.slider, steps.places[start], undo)
+        if not control.is_key:
+            # A slider that starts where it shows the Basis leaves the object looking as it did.
+            start = min(set(range(len(steps.places))) - shapes.keys(), default=0)
+            slider.ensure_property(control.owner, chain.slider, steps.places[start], undo)
         undo.callback(setattr, chain, "places", chain.places)
         undo.callback(setattr, chain, "corners", chain.corners)
         chain.places, chain.corners = steps
@@ -234,24 +302,34 @@ def chain_written(
             undo.callback(set_key_coordinates, key, key_coordinates(obj, key.name))
             set_key_coordinates(key, shapes[step])
             undo.callback(setattr, key, "relative_key", key.relative_key)
-            key.relative_key = keys.reference_key  # another one may have been moved to the top
+            key.relative_key = base  # another one may have been moved to the top
         for step in sorted(shapes.keys() - kept.keys()):
-            written[step] = _new_key(obj, names.key_name(chain.slider, step, steps.places), undo)
+            written[step] = _new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
+            if control.is_key:
+                drivers.drive_mute(written[step], control)
         if keyframes is not None:
-            curve, notes = slider.begin_keyframes(control.owner, chain, keyframes, undo)
+            curve, notes = slider.begin_keyframes(control, chain, keyframes, undo)
         chain.keys = {step: written[step].name for step in sorted(written)}
         chain.keyframes = chain.keyframes if curve is None else keyframes
         yield undo, notes
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
-    for step, key in kept.items():
-        _widen(key)
-        drivers.drive_value(key, control, weights, step)
+    _let_play(kept, control, weights)
     if curve is not None:
         slider.set_keyframes(curve, keyframes)
     remove_keys(obj, stale)
+
+
+def _let_play(kept: dict[int, bpy.types.ShapeKey], control: Control, weights: Weights) -> None:
+    """Give keys of an earlier bake the weights of this one."""
+    for step, key in kept.items():
+        if (key.slider_min, key.slider_max) == (0.0, 1.0):  # else the user chose it
+            _widen(key)
+        drivers.drive_value(key, control, weights, step)
+        if control.is_key:
+            drivers.drive_mute(key, control)
 
 
 def _kept(
@@ -283,12 +361,12 @@ def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
     _activate(obj, active)
 
 
-def _new_key(obj: bpy.types.Object, name: str, undo: ExitStack) -> bpy.types.ShapeKey:
+def _new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: ExitStack) -> bpy.types.ShapeKey:
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)
     key.value = 0.0  # Blender 5 starts with 1
     _widen(key)
-    key.relative_key = obj.data.shape_keys.reference_key
+    key.relative_key = base
     return key
 
 

@@ -15,7 +15,7 @@ import bpy
 
 from .. import compat
 from ..store.records import Chain
-from .control import slider_path
+from .control import Control, slider_path
 
 
 def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitStack) -> None:
@@ -37,21 +37,24 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitSt
 
 
 def begin_keyframes(
-    obj: bpy.types.Object, chain: Chain, wanted: tuple[int, int], undo: ExitStack
+    control: Control, chain: Chain, wanted: tuple[int, int], undo: ExitStack
 ) -> tuple[bpy.types.FCurve | None, list[str]]:
     """The curve to give keyframes over two frames, None where it is left as it is; a sentence where that is so.
 
     Keyframes that the animator made are never replaced, and neither are those of an earlier bake over the same frames,
     whose timing may have been edited since. Closing ``undo`` takes back what was made.
     """
-    path = slider_path(chain.slider)
-    existing = compat.find_fcurve(obj, path)
+    owner, path = control.owner, control.path
+    what = f"key '{control.name}'" if control.is_key else f"slider '{control.name}'"
+    if owner.animation_data is not None and owner.animation_data.drivers.find(path) is not None:
+        return None, [f"The {what} is driven, and got no keyframes."]
+    existing = compat.find_fcurve(owner, path)
     if existing is not None and len(existing.keyframe_points):
         if chain.keyframes is None:
-            return None, [f"The slider '{chain.slider}' is animated already; its keyframes were left as they are."]
+            return None, [f"The {what} is animated already; its keyframes were left as they are."]
         if chain.keyframes == wanted:
             return None, []
-    return compat.ensure_fcurve(obj, path, undo), []
+    return compat.ensure_fcurve(owner, path, undo), []
 
 
 def set_keyframes(curve: bpy.types.FCurve, frames: tuple[int, int]) -> None:

@@ -89,12 +89,10 @@ class QC3D_OT_select_worst(bpy.types.Operator):
         except QC3DError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        mesh, owner = obj.data, control_of(obj, chain).owner
-        if isinstance(owner[chain.slider], float):
-            owner[chain.slider] = worst.at
-            owner.update_tag()
-        else:
-            self.report({"WARNING"}, f"The slider '{chain.slider}' has whole numbers only and stays where it is.")
+        mesh = obj.data
+        stays = control_of(obj, chain).put(worst.at)
+        if stays is not None:
+            self.report({"WARNING"}, stays)
         # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
         steps = owned_keys(mesh.shape_keys, chain)
         if steps:

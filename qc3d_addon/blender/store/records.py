@@ -23,6 +23,7 @@ from ...solver.errors import InputError
 from . import id_properties
 from . import stored_values as stored
 from .names import LIMIT, MAX_STEPS
+from .renames import renamed
 from .summaries import Summary
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ LEAST_DISTANCE = 1e-5  # between two places
 _MOST_FRAME = 2**31  # from 0, either way
 _LONGEST_KEY = 2 * LIMIT  # bytes: a mirror image goes through keys of names made up for it
 _LONGEST_FINGERPRINT = 1000
+_LONGEST_DIGEST = 64
 
 
 class DamagedRecordError(InputError):
@@ -66,6 +68,11 @@ class Chain:
         ``BakeRequest.again`` looks into it.
     result
         What the panel shows of the newest bake, None for those of older versions.
+    on_key
+        Name of the user's key whose value plays the chain, the last of ``through``; empty where a slider of its own
+        does. ``slider`` is then only what the chain is called.
+    digests
+        What tells the shapes of the keys ``through`` at the newest bake; empty for those of older versions.
     mirror_of
         Slider of the chain that this one is the mirror image of; empty where it was baked from keys of its own.
     """
@@ -79,6 +86,8 @@ class Chain:
     request: dict[str, Any] = field(default_factory=dict)
     result: Summary | None = None
     mirror_of: str = ""
+    on_key: str = ""
+    digests: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, values: object) -> Chain:
@@ -101,9 +110,18 @@ class Chain:
             keyframes = (first, last)
         request, result = _request(found.pop("request", {})), Summary.from_json(found.pop("result", None))
         slider, mirror_of = stored.name(found.pop("slider")), stored.text(found.pop("mirror_of", ""), LIMIT)
+        on_key = stored.text(found.pop("on_key", ""), LIMIT)
+        digests = tuple(stored.text(one, _LONGEST_DIGEST) for one in stored.plain_list(found.pop("digests", [])))
+        if on_key not in ("", through[-1]):
+            raise ValueError("played by a key that is not its last")
         if found:
             raise ValueError("values that are not known")
-        return cls(through, slider, places, corners, keys, keyframes, request, result, mirror_of)
+        return cls(through, slider, places, corners, keys, keyframes, request, result, mirror_of, on_key, digests)
+
+    @property
+    def base(self) -> str:
+        """Name of the key that the one which plays the chain is relative to; empty where there is a slider."""
+        return self.through[0] if self.on_key else ""
 
     @property
     def intervals(self) -> int:
@@ -156,7 +174,11 @@ class Record:
             If the record is damaged (DamagedRecordError), or a later version wrote it.
         """
         text = keys.get(PROPERTY)
-        return cls() if text is None else cls._parsed(text, keys.name)
+        if text is None:
+            return cls()
+        record = cls._parsed(text, keys.name)
+        record._follow(keys)
+        return record
 
     @classmethod
     def _parsed(cls, text: object, owner: str) -> Record:
@@ -169,7 +191,8 @@ class Record:
                 )
             chains = [Chain.from_json(entry) for entry in stored.plain_list(values["chains"])]
             maps = [KeptMap.from_json(entry) for entry in stored.plain_list(values["maps"])]
-            for of_each in ([chain.slider for chain in chains], [chain.through for chain in chains]):
+            controls = [chain.on_key or chain.through for chain in chains]
+            for of_each in ([chain.slider for chain in chains], controls):
                 if len(set(of_each)) < len(of_each):
                     raise ValueError("two chains with one slider, or through the same keys")
         except (ValueError, KeyError, TypeError) as error:
@@ -178,6 +201,13 @@ class Record:
                 "In-Betweens, which keeps all shape keys and sliders, then bake anew."
             ) from error
         return cls(chains, maps)
+
+    def _follow(self, keys: bpy.types.Key) -> None:
+        """Take the names that keys of chains have now where they were renamed; their maps are made again."""
+        for chain in self.chains:
+            names = renamed(keys, chain)
+            chain.through = tuple(names.get(name, name) for name in chain.through)
+            chain.on_key = names.get(chain.on_key, chain.on_key)
 
     def write(self, keys: bpy.types.Key, undo: ExitStack) -> None:
         """Keep the record with ``keys``, without the maps of keys that no longer exist; ``undo`` can take it back."""
@@ -190,8 +220,12 @@ class Record:
         id_properties.put(keys, PROPERTY, text, undo)
 
     def chain(self, through: tuple[str, ...]) -> Chain | None:
-        """The chain through these keys, if it was baked before."""
-        return next((chain for chain in self.chains if chain.through == through), None)
+        """The chain through these keys on a slider of its own, if it was baked before."""
+        return next((chain for chain in self.chains if chain.through == through and not chain.on_key), None)
+
+    def chain_on_key(self, name: str) -> Chain | None:
+        """The chain that the value of a key plays, if it was baked before."""
+        return next((chain for chain in self.chains if chain.on_key == name), None)
 
     def chain_of_slider(self, slider: str) -> Chain | None:
         """The chain that a slider plays; the newest where the name is empty."""

@@ -76,7 +76,7 @@ def _draw_chain(
     control = shape_keys.control_of(obj, chain)
     control_problem = control.problem
     if control_problem is None:
-        layout.prop(control.owner, control.path, text=chain.slider, slider=True)
+        layout.prop(*control.shown, text=control.name, slider=True)
     else:
         draw_sentence(context, layout, control_problem, 'ERROR')
     if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):

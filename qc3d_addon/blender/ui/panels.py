@@ -63,6 +63,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
     amount.prop(settings, "use_tolerance")
     look = layout.column()
+    look.row().prop(settings, "play_on", expand=True)
     look.prop(settings, "mode")
     look.row().prop(settings, "quality", expand=True)
     look.prop_search(settings, "colliders", bpy.data, "collections")

@@ -38,6 +38,7 @@ State = Callable[[], dict[str, Any]]
 FOLDER = str(Path(plans.__file__).parents[1])
 ENDINGS = (
     shape_keys.remove_keys,
+    shape_keys._let_play,
     slider.set_keyframes,
     heat_map.hide,
     keyframes._put_in_place,
@@ -109,7 +110,7 @@ def outcome_of(plan: Plan) -> tuple[Plan, Outcome]:
 
 
 def request(to_key: str = "Lean", count: int = 2, **choices: Any) -> BakeRequest:  # noqa: ANN401 - of the request
-    return BakeRequest(("Basis", to_key), count, **choices)
+    return BakeRequest(("Basis", to_key), count, play_on="slider", **choices)
 
 
 @pytest.fixture

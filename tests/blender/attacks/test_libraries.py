@@ -40,7 +40,7 @@ def library(figure: bpy.types.Object, tmp_path: Path) -> Path:
 
 def bake(count: int) -> None:
     choices = {"count": count, "mode": "linear"}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
 
 
 def linked(path: Path) -> bpy.types.Object:
@@ -147,7 +147,7 @@ def off(figure: bpy.types.Object, tmp_path: Path) -> bpy.types.Collection:
 def test_a_library_of_colliders_is_reloaded_meanwhile(off: bpy.types.Collection, tmp_path: Path, moved: bool) -> None:
     figure = bpy.data.objects["Figure"]
     bpy.context.view_layer.objects.active = figure
-    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 1, colliders="Off"))
+    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 1, colliders="Off", play_on="slider"))
     outcome = finish(carry_out(plan.task))
     if moved:
         run_elsewhere(tmp_path / "balls.blend", "bpy.data.objects['Ball'].location.x = 3.0")

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys of the user that were renamed since a bake: Blender lets drivers and curves follow, and so does the record."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+if TYPE_CHECKING:
+    from .records import Chain
+
+_VALUE = re.compile(r'key_blocks\["(.*)"\]\.value', re.DOTALL)
+
+
+def digest(key: bpy.types.ShapeKey) -> str:
+    """A short text that tells the shape of a key from others."""
+    values = np.empty(3 * len(key.points), dtype=np.float32)
+    key.points.foreach_get("co", values)
+    return hashlib.sha256(values.tobytes()).hexdigest()[:16]
+
+
+def renamed(keys: bpy.types.Key, chain: Chain) -> dict[str, str]:
+    """The names that keys of a chain have now, by those that they had, where that can be told.
+
+    The key that plays a chain is the one that the chain's drivers read, and what it is relative to is known from
+    itself. Any other is the one key that has the shape which it had at the bake. Quick where no key is missing.
+    """
+    blocks = keys.key_blocks
+    found: dict[str, str] = {}
+    if chain.on_key:
+        read = _read(keys, chain)
+        if read is not None and read != chain.on_key:
+            found[chain.on_key] = read
+        control = blocks.get(read or chain.on_key)
+        if control is not None and chain.through[0] not in blocks:
+            found[chain.through[0]] = control.relative_key.name
+    for name, shape in zip(chain.through, chain.digests, strict=False):
+        if name in blocks or name in found:
+            continue
+        known = {*chain.through, *chain.keys.values()}
+        same = [key.name for key in blocks if key.name not in known and digest(key) == shape]
+        if len(same) == 1:
+            found[name] = same[0]
+    return found
+
+
+def _read(keys: bpy.types.Key, chain: Chain) -> str | None:
+    """Name of the key whose value the chain's drivers read; None where there is none."""
+    if keys.animation_data is None:
+        return None
+    for name in chain.keys.values():
+        curve = keys.animation_data.drivers.find(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
+        if curve is None or len(curve.driver.variables) != 1 or curve.driver.variables[0].type != 'SINGLE_PROP':
+            continue
+        match = _VALUE.fullmatch(curve.driver.variables[0].targets[0].data_path)
+        read = None if match is None else bpy.utils.unescape_identifier(match[1])
+        if read in keys.key_blocks:
+            return str(read)
+    return None

@@ -229,10 +229,10 @@ def fit_options(choices: MapChoices) -> FitOptions:
     return FitOptions(**{name: getattr(choices, name) for name in names})
 
 
-def bake_request(choices: BakeChoices) -> BakeRequest:
-    """The choices as a request; raises InputError where they do not fit together."""
+def bake_request(choices: BakeChoices, keys: tuple[str, ...] | None = None) -> BakeRequest:
+    """The choices as a request, for their own keys or others; raises InputError where they do not fit together."""
     return BakeRequest(
-        keys=key_names(choices),
+        keys=key_names(choices) if keys is None else keys,
         count=choices.count,
         fit_options=fit_options(choices),
         frame_options=FrameOptions(choices.mode, choices.easing),

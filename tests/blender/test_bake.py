@@ -289,7 +289,7 @@ class TestSlider:
 def test_what_the_caller_leaves_out_comes_from_the_panel(figure: bpy.types.Object, quick_map: list[Any]) -> None:
     figure.qc3d.from_key, figure.qc3d.to_key = "Lean", "Stretch"
     figure.qc3d.count, figure.qc3d.quality, figure.qc3d.engine = 2, 'finest', 'delaunay'
-    assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider") == {'FINISHED'}
     assert "Lean_to_Stretch_33" in figure.data.shape_keys.key_blocks
     bpy.ops.qc3d.bake_inbetweens(play_on="slider", count=1, quality='normal')
     assert "Lean_to_Stretch_50" in figure.data.shape_keys.key_blocks

@@ -191,9 +191,9 @@ class TestPanel:
         bpy.ops.qc3d.add_inner_key()
         settings.via[1].name = "Lean"
         with pytest.raises(RuntimeError, match="Choose inner key 1"):
-            bpy.ops.qc3d.bake_inbetweens()
+            bpy.ops.qc3d.bake_inbetweens(play_on="slider")
         bpy.ops.qc3d.remove_inner_key(index=0)
-        assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(play_on="slider") == {'FINISHED'}
         assert CHAIN in figure
         with pytest.raises(RuntimeError, match="There is no row 1"):
             bpy.ops.qc3d.remove_inner_key(index=1)
@@ -210,7 +210,7 @@ class TestPanel:
             if name != "mesh_time_limit":
                 setattr(figure.qc3d, name, value)
         figure.qc3d.from_key, figure.qc3d.to_key = "Basis", "Lean"
-        bpy.ops.qc3d.bake_inbetweens()
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider")
         bpy.ops.qc3d.prepare()
         assert quick_map == [chosen, chosen]
         remembered = Record.read(figure.data.shape_keys).chains[0].request["settings"]

@@ -117,7 +117,7 @@ class TestBake:
 
     def test_the_panel_names_it_too(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
         figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.colliders = "Basis", "Lean", "Off"
-        assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(play_on="slider") == {'FINISHED'}
         assert Record.read(figure.data.shape_keys).chains[0].request["colliders"] == "Off"
 
     @pytest.mark.parametrize(

@@ -236,10 +236,10 @@ class TestLaterFailures:
     def test_a_locked_key_that_would_be_replaced(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str]
     ) -> None:
-        baked.data.shape_keys.key_blocks["Basis_to_Lean_67"].lock_shape = True
+        baked.data.shape_keys.key_blocks["Basis_to_Lean_100"].lock_shape = True
         before = state()
         assert bake() == (
-            "Error: Shape key 'Basis_to_Lean_67' of an earlier bake is locked; unlock it first."
+            "Error: Shape key 'Basis_to_Lean_100' of an earlier bake is locked; unlock it first."
         )
         assert state() == before
 

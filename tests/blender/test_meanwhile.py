@@ -217,11 +217,6 @@ def sculpt_another_key(figure: bpy.types.Object) -> None:
     figure.data.shape_keys.key_blocks["Stretch"].points[5].co.x += 0.25
 
 
-def change_its_weights(figure: bpy.types.Object) -> None:
-    figure.vertex_groups.new(name="Half").add([1, 2, 3], 0.5, 'REPLACE')
-    figure.data.shape_keys.key_blocks["Lean"].vertex_group = "Half"
-
-
 def give_it_a_modifier(figure: bpy.types.Object) -> None:
     figure.modifiers.new("Finer", 'SUBSURF')
 
@@ -237,7 +232,6 @@ def give_it_a_modifier(figure: bpy.types.Object) -> None:
         put_the_last_key_first,
         move_the_first_key_down,
         sculpt_another_key,
-        change_its_weights,
         give_it_a_modifier,
     ],
 )

@@ -49,7 +49,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
             copy[chain.slider] = 0.0
             for driven in drivers.driven_by(copy.data.shape_keys, control.path).values():
                 if drivers.reads(driven.driver, control):
-                    drivers.read(driven.driver, played)
+                    driven.driver.variables[0].targets[0].id = copy
         curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)

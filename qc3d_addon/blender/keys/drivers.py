@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
 
 VARIABLE = "slider"
+# Blender takes points of a curve that are nearer than 0.01 to each other as one.
+_LEAST_STEP = 0.02
 # A cardinal spline falls to about 0.27 of itself from knot to knot: beyond so many it is 0 in single precision.
 _REACH = 16
 _CLOSE = 1e-4  # of values and places in curves: single precision, which users do not change by as little
@@ -33,8 +35,10 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
     if curve is None:
         curve = compat.new_driver(keys, path)
-    read(curve.driver, control)
     knots, values, slopes = _function(weights, step)
+    stretch = _stretch(weights.knots)
+    read(curve.driver, control, stretch)
+    knots, slopes = knots * stretch, slopes / stretch
     width = np.diff(knots) / 3.0
     before, after = np.append(width[0], width), np.append(width, width[-1])
     left = np.column_stack([knots - before, values - before * slopes[0]])
@@ -54,15 +58,19 @@ def drive_mute(key: bpy.types.ShapeKey, control: Control) -> None:
 
 def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike, values: ArrayLike) -> None:
     """Let a new driver go straight through values (k,) at places (k,) of the control, and stay at them at the ends."""
-    read(curve.driver, control)
-    points = np.column_stack([places, values])
+    stretch = _stretch(np.asarray(places))
+    read(curve.driver, control, stretch)
+    points = np.column_stack([np.asarray(places) * stretch, values])
     _set_curve(curve, points, points, points, 'LINEAR')
     curve.extrapolation = 'CONSTANT'
 
 
-def read(driver: bpy.types.Driver, control: Control) -> None:
-    """Let a driver have the control as its only variable, and its value."""
+def read(driver: bpy.types.Driver, control: Control, stretch: int = 1) -> None:
+    """Let a driver have the control as its only variable, and so many times its value."""
     _read_path(driver, control, control.path)
+    if stretch != 1:
+        driver.type = 'SCRIPTED'
+        driver.expression = f"{VARIABLE} * {stretch}"  # simple enough to run without the permission that scripts need
 
 
 def _read_path(driver: bpy.types.Driver, control: Control, path: str) -> None:
@@ -82,13 +90,13 @@ def _read_path(driver: bpy.types.Driver, control: Control, path: str) -> None:
 
 def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
     """Whether a driver of this curve gives the weight of a step, as a bake of this or an earlier version made it."""
-    if curve.driver.type == 'SCRIPTED':
-        return bool(curve.driver.expression == _earlier_expression(step, len(weights.knots) - 1))
+    if curve.driver.expression == _earlier_expression(step, len(weights.knots) - 1):
+        return True
     knots, values, _ = _function(weights, step)
     points = np.empty(2 * len(curve.keyframe_points))
     curve.keyframe_points.foreach_get("co", points)
-    return bool(len(points) == 2 * len(knots) and np.allclose(points.reshape(-1, 2), np.column_stack([knots, values]),
-                                                              rtol=0.0, atol=_CLOSE))  # fmt: skip
+    wanted = np.column_stack([knots * _stretch(weights.knots), values])
+    return len(points) == wanted.size and np.allclose(points.reshape(-1, 2), wanted, rtol=0.0, atol=_CLOSE)
 
 
 def undrive(key: bpy.types.ShapeKey) -> None:
@@ -119,6 +127,12 @@ def reads(driver: bpy.types.Driver, control: Control) -> bool:
         for variable in driver.variables
         for target in variable.targets
     )
+
+
+def _stretch(knots: NDArray[np.float64]) -> int:
+    """How many times the control a curve is over, so that its points stand apart."""
+    least = float(np.diff(knots).min())
+    return 1 if least >= _LEAST_STEP else 10 ** int(np.ceil(np.log10(_LEAST_STEP / least)))
 
 
 def _function(weights: Weights, step: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -205,7 +205,7 @@ class Record:
     def _follow(self, keys: bpy.types.Key) -> None:
         """Take the names that keys of chains have now where they were renamed; their maps are made again."""
         for chain in self.chains:
-            names = renamed(keys, chain)
+            names = renamed(keys, chain.through, chain.digests, chain.on_key, chain.keys.values())
             chain.through = tuple(names.get(name, name) for name in chain.through)
             chain.on_key = names.get(chain.on_key, chain.on_key)
 

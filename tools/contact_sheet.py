@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw in-betweens side by side: first key, in-betweens, second key, one row for each file.
+"""Draw in-betweens side by side: the first key, the in-betweens, the second key, one row for each file.
 
-A file is a baked .blend (then --object, --from and --to say what to draw) or the FRAMES.npz of ``qc3d interpolate``.
-All rows show the same two keys, through the same camera.
+A file is a baked .blend, with --object, --from and --to to say what to draw, or the FRAMES.npz of ``qc3d interpolate``.
+All rows show the same two keys through the same camera.
 
     python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --object Arm --from Basis --to "Bend 90" \\
         --straight --output sheet.png
@@ -24,7 +24,7 @@ from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Read the rows and write the picture; SystemExit with one sentence where that cannot be done."""
+    """Read the rows and write the picture; SystemExit with one sentence if that is impossible."""
     try:
         _draw(_arguments(argv))
     except QC3DError as error:
@@ -86,7 +86,7 @@ def _read(text: str, arguments: argparse.Namespace) -> Row:
 
 
 def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> Row:
-    """The user's own keys and the in-betweens that were baked between them."""
+    """The row of a chain in a .blend file: the user's own keys and the in-betweens baked between them."""
     import bpy
 
     from qc3d_addon.blender.keys.shape_keys import step_shapes
@@ -109,7 +109,7 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:
-    """Positions and triangles of a mesh in the file that was read last, in the scene's coordinates."""
+    """Vertices and triangles of a mesh in the .blend that was opened last, in world coordinates."""
     import bpy
 
     from qc3d_addon.blender.store.mesh_data import triangles

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from . import steps
 from .arrays import Floats
 from .collision.colliders import Collider
+from .combinations.base import KeysOnBase
+from .combinations.combine import Combination
+from .combinations.verdicts import Verdict, verdicts
 from .errors import InputError, QC3DError
 from .fit.files import KeptMaps, read_maps, write_maps
 from .fit.fitted_map import FittedMap, Residual
@@ -30,13 +33,17 @@ from .support.progress import Progress, Steps, finish
 
 __all__ = [
     "Collider",
+    "Combination",
     "Fit",
     "FitOptions",
     "FrameOptions",
     "InputError",
     "QC3DError",
+    "Verdict",
     "bake",
+    "combine",
     "fit",
+    "judge_pairs",
     "load_fit",
     "steps",
 ]
@@ -232,3 +239,68 @@ def bake(
     """
     work = steps.bake(keys, faces, frames, edges, mode=mode, easing=easing, colliders=colliders, **options)
     return work.run(progress)
+
+
+def combine(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    weights: Sequence[float] | None = None,
+    order: Sequence[int] | None = None,
+    progress: OnProgress | None = None,
+    **options: Unpack[FitChoices],
+) -> Combination:
+    """The shape with several keys of one base on at once.
+
+    Parameters
+    ----------
+    base : (n, 3)
+        The shape that the keys are relative to.
+    keys : sequence of (n, 3)
+        Two or more.
+    faces, edges
+        See ``fit``.
+    weights : sequence of float, optional
+        How much each key is on, 0..1; all fully where none are given. One that is partly on takes a fit.
+    order : sequence of int, optional
+        Numbers of the keys, the outermost first: a key's motion happens inside those before it. Where it is not given
+        it is found: the outer of two keys is the one that turns more where the other bends.
+    progress : callable
+        Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
+    **options
+        See ``FitOptions``.
+
+    Raises
+    ------
+    QC3DError
+        If the keys, weights, order or options cannot be used, the volume of a key that is partly on cannot be filled,
+        or memory would not do.
+    """
+    return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
+
+
+def judge_pairs(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    pairs: Sequence[tuple[int, int]] | None = None,
+) -> Iterator[Verdict]:
+    """For every two keys of one base, one after the other: is their sum right, or does it need a combination?
+
+    Parameters
+    ----------
+    base, keys, faces, edges
+        See ``combine``.
+    pairs : sequence of (int, int), optional
+        Numbers of the keys, where not every two are asked for.
+
+    Raises
+    ------
+    InputError
+        If the keys cannot be used.
+    """
+    return verdicts(KeysOnBase(base, keys, faces, edges), pairs)

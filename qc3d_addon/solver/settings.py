@@ -135,7 +135,7 @@ class PlayOptions:
         Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
         help; ``count`` is then not looked at.
     weights
-        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbours.
+        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbors.
     also_at
         Positions of more in-betweens, each between 0 and 1.
 

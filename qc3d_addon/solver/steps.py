@@ -20,6 +20,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .collision.colliders import Collider
+from .combinations import combine as combining
+from .combinations.base import KeysOnBase
+from .combinations.combine import Combination
 from .errors import InputError
 from .fit import fit_pair as fitting
 from .fit.fitted_map import FittedMap
@@ -96,6 +99,20 @@ def bake(
     )
     task.require_memory(machine_limit_mb())
     return Work(_bake_of(tasks.carry_out(task)))
+
+
+def combine(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    weights: Sequence[float] | None = None,
+    order: Sequence[int] | None = None,
+    **options: Unpack[FitChoices],
+) -> Work[Combination]:
+    """Several keys of one base on at once, step by step; see :func:`.api.combine` for the parameters."""
+    return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
 
 
 def times_of(frames: int | ArrayLike, pairs: int = 1) -> Floats:

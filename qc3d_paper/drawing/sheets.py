@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact sheets: the frames of several bakes below each other, through one camera."""
+"""Contact sheets: the frames of several bakes, one bake per row, all drawn through one camera."""
 
 from __future__ import annotations
 
@@ -23,9 +23,20 @@ _DOTS_PER_INCH = 100
 
 
 class Row(NamedTuple):
-    """Shapes (k, n, 3) of one mesh at ``times`` (k,), the first and the last of them the keys.
+    """One row of a sheet.
 
-    The last ``scenery`` of the triangles are not the mesh's own and painted grey.
+    Parameters
+    ----------
+    label : str
+        Text beside the row.
+    faces : (m, 3) int64
+        Triangles.
+    times : (k,)
+        Times of the frames.
+    frames : (k, n, 3)
+        Shapes of the mesh; the first and the last are the keys.
+    scenery : int
+        Number of triangles, at the end of ``faces``, that belong to the surroundings and are painted gray.
     """
 
     label: str
@@ -35,7 +46,7 @@ class Row(NamedTuple):
     scenery: int = 0
 
     def with_scenery(self, points: Floats, faces: Ints) -> Row:
-        """The row with a mesh that stays where it is, (c, 3) and (f, 3)."""
+        """The row with an additional fixed mesh: vertices (c, 3) and triangles (f, 3)."""
         still = np.broadcast_to(points, (len(self.frames), *points.shape))
         return self._replace(
             faces=np.concatenate([self.faces, faces + self.frames.shape[1]]),
@@ -45,13 +56,23 @@ class Row(NamedTuple):
 
 
 def straight_blend(row: Row) -> Row:
-    """What Blender's sliders give between the same two keys: every vertex on a straight line."""
+    """The row that Blender's own sliders would give between the same keys: each vertex moves along a straight line."""
     weight = row.times[:, None, None]
     return row._replace(label="straight blend", frames=(1.0 - weight) * row.frames[0] + weight * row.frames[-1])
 
 
 def save_sheet(rows: list[Row], view: str, height: int, file: Path | BinaryIO) -> None:
-    """Draw the rows, all through one camera, and save them as a PNG."""
+    """Draw all rows through one camera and save them as a PNG.
+
+    Parameters
+    ----------
+    rows : list of Row
+    view : str
+        One of ``VIEWS``, or ``auto`` for the view that shows the motion best.
+    height : int
+        Height of a row in pixels.
+    file : Path or BinaryIO
+    """
     if view == "auto":
         view = best_view(rows[0].frames[0], rows[0].frames[-1])
     camera = Camera.around(np.concatenate([row.frames for row in rows]), view)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a contact sheet: what is covered, what hides what, and rows of equal size."""
+"""Contact sheets: covered pixels, hidden surfaces, and rows of equal size."""
 
 from __future__ import annotations
 

@@ -7,6 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files.npz import Archive, Header, open_archive
@@ -41,6 +44,21 @@ def read_pairs(
         If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if the machine
         does not have enough memory.
     """
+    pairs = len(set(pairwise(names)))
+    shapes, faces = read_shapes(path, names, pairs=pairs, frames=frames, quality=quality, needs_fits=needs_fits)
+    return consecutive_pairs(shapes, faces, None, names)
+
+
+def read_shapes(
+    path: Path,
+    names: Sequence[str],
+    *,
+    pairs: int = 0,
+    frames: int = 0,
+    quality: Quality = "normal",
+    needs_fits: bool = True,
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
+    """Shapes (n, 3) of one mesh by their names, and its triangles (m, 3); see ``read_pairs``, for so many pairs."""
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
         known = _shape_names(archive, path)
         for name in names:
@@ -51,12 +69,11 @@ def read_pairs(
         for name, array in arrays.items():
             _require_coordinates(headers[array], name, path)
         vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
-        pairs = len(set(pairwise(names)))
         needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
         if limit := machine_limit_mb():
             require_memory(needed, limit, vertices)
         found = archive.read(headers)
-    return consecutive_pairs({name: found[array] for name, array in arrays.items()}, found["faces"], None, names)
+    return {name: found[array] for name, array in arrays.items()}, found["faces"]
 
 
 def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") -> KeyPair:

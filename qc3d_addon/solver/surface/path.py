@@ -89,7 +89,7 @@ class SurfacePath:
             still[usable.faces[self.turning.angles > np.pi]] = False
         self.still = still[self._group]
         self._free = ~still
-        self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
+        self._springs = edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self.components = labels[self._group]
@@ -193,7 +193,7 @@ def _spans(positions: Floats, edges: Ints) -> Floats:
     return np.asarray(positions[edges[:, 1]] - positions[edges[:, 0]])
 
 
-def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
+def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
     """(k, 2) edges that no usable triangle holds together: wires and edges of triangles without an area."""
     every = unique_edges(np.concatenate([sides(faces), wires]))
     held = unique_edges(sides(usable))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distortion at the vertices of every frame: known answers on grown shapes, chains, and the worst place."""
+"""Distortion at the vertices of every frame: known answers on scaled shapes, chains, and the worst place."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The system of a surface's moving vertices is the one that dense formulas give, and it solves what it should."""
+"""The linear system of a surface's moving vertices against dense formulas."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Volumes of closed components, their derivative, and the step that restores them."""
+"""Volumes of closed components, their gradients, and the step that restores them."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     """The row of a chain in a .blend file: the user's own keys and the in-betweens baked between them."""
     import bpy
 
-    from qc3d_addon.blender.keys.shape_keys import step_shapes
+    from qc3d_addon.blender.keys.chain_shapes import step_shapes
     from qc3d_addon.blender.store.mesh_data import triangles
     from qc3d_addon.blender.store.records import Record
 

@@ -19,7 +19,7 @@ from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
 from . import compat
-from .keys import shape_keys
+from .keys import chain_keys, shape_keys
 from .store.mesh_data import key_coordinates, set_key_coordinates
 from .store.records import Chain, Record
 
@@ -62,8 +62,8 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
         If the object of the plan is gone or was changed meanwhile, or the slider is not a number; it is as it was.
     """
     obj = plan.find_object()
-    shape_keys.control_of(obj, chain).require()
-    shape_keys.restart_drivers(obj.data.shape_keys, chain)
+    chain_keys.control_of(obj, chain).require()
+    chain_keys.restart_drivers(obj.data.shape_keys, chain)
     end()
     _show(obj, _Scrub(plan, chain, chain.weights, curve))
 
@@ -112,7 +112,7 @@ def _follow(scrub: _Scrub) -> None:
     if obj.data.is_editmode:
         scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
         return
-    control = shape_keys.control_of(obj, scrub.chain)
+    control = chain_keys.control_of(obj, scrub.chain)
     is_whole = len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
     if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or control.problem is not None:
         end()

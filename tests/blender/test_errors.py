@@ -231,7 +231,7 @@ class TestLaterFailures:
 
     @pytest.fixture
     def bake(self) -> Callable[..., str]:
-        return lambda **choices: refused(bpy.ops.qc3d.bake_inbetweens, **{"count": 5, **choices})
+        return lambda **choices: refused(bpy.ops.qc3d.bake_inbetweens, **{"count": 5, "play_on": "slider", **choices})
 
     def test_a_locked_key_that_would_be_replaced(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str]

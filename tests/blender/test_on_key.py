@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from qc3d_addon.blender.keys import shape_keys
+from qc3d_addon.blender.keys import chain_shapes
 from qc3d_addon.blender.store.records import Chain, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
@@ -42,7 +42,7 @@ def at(obj: bpy.types.Object, shown: Shown, value: float, name: str = "Lean") ->
 
 def path(obj: bpy.types.Object) -> CubicSpline:
     chain = chain_of(obj)
-    return CubicSpline(chain.places, shape_keys.step_shapes(obj, chain))
+    return CubicSpline(chain.places, chain_shapes.step_shapes(obj, chain))
 
 
 def test_its_own_value_plays_the_path_and_the_key_is_as_it_was(
@@ -145,7 +145,7 @@ def test_a_key_with_a_vertex_group_plays_as_it_shows(figure: bpy.types.Object, s
     rest, end = at(figure, shown, 0.0), at(figure, shown, 1.0)
     bake(count=3)
     np.testing.assert_allclose(at(figure, shown, 1.0), end, atol=1e-7)
-    found = shape_keys.step_shapes(figure, chain_of(figure))
+    found = chain_shapes.step_shapes(figure, chain_of(figure))
     np.testing.assert_allclose(found[-1], end, atol=1e-6)
     parts = (at(figure, shown, 0.25) - rest) / np.where(np.abs(end - rest) > 0.01, end - rest, np.inf)
     moving = np.abs(end - rest) > 0.01

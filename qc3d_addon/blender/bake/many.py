@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...solver.errors import InputError, QC3DError
-from ..keys import shape_keys
+from ..keys import chain_keys
 from ..store import checks
 from ..store.records import Record
 from ..store.renames import digest
@@ -62,7 +62,7 @@ def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
         If the object cannot be baked.
     """
     keys = checks.require_object(obj).data.shape_keys
-    made = {key.name for chain in Record.read(keys).chains for key in shape_keys.owned_keys(keys, chain).values()}
+    made = {key.name for chain in Record.read(keys).chains for key in chain_keys.owned_keys(keys, chain).values()}
     return [key.name for key in keys.key_blocks if key != keys.reference_key and key.name not in made]
 
 
@@ -94,7 +94,7 @@ def plan_key(obj: bpy.types.Object, name: str, choices: BakeRequest) -> Plan | V
         through = chain.through if chain is not None and chain.through[0] == base else (base, name)
         request = replace(choices, keys=through, play_on="key", keyframes=None)
         if chain is not None and chain.through == through and chain.request == request.remembered():
-            is_whole = shape_keys.owned_keys(keys, chain).keys() == chain.keys.keys()
+            is_whole = chain_keys.owned_keys(keys, chain).keys() == chain.keys.keys()
             if is_whole and chain.digests == tuple(digest(keys.key_blocks[other]) for other in through):
                 return Verdict(name, "left", "baked already, and its keys are as they were", {})
         plan = plan_bake(obj, request)

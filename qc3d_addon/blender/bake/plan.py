@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ...solver.errors import InputError
-from ..keys import shape_keys
+from ..keys import chain_keys, chain_shapes, shape_keys
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
 from ..store.renames import digest
@@ -166,7 +166,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     from ...solver.frames.bake import evenly_spaced
 
     request = request_again(obj, chain)
-    shape_keys.control_of(obj, chain).require()
+    chain_keys.control_of(obj, chain).require()
     plan = plan_bake(obj, request)
     times = evenly_spaced(PREVIEW_STEPS * (len(request.keys) - 1) - 1)
     even = replace(request.frame_options, easing="linear")
@@ -207,12 +207,12 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     shape_keys.require_writable(obj, chain, request.keyframes)
     steps = shape_keys.Steps(tuple(bake.times.tolist()), tuple(played.corners))
     if chain.on_key:
-        shapes = shape_keys.offsets_by_step(obj, steps.places, bake.frames)
+        shapes = chain_shapes.offsets_by_step(obj, steps.places, bake.frames)
     else:
-        shapes = shape_keys.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
+        shapes = chain_shapes.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
 
     with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
-        control = shape_keys.control_of(obj, chain)
+        control = chain_keys.control_of(obj, chain)
         owner = obj.name if control.is_key else control.owner.name
         notes = [*plan.notes, *bake.report.notes, *said]
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)

@@ -12,7 +12,7 @@ import numpy as np
 from ...solver.arrays import Floats
 from .. import compat
 from ..heat_map import heat_map
-from ..keys import drivers, shape_keys
+from ..keys import chain_keys, chain_shapes, drivers
 from ..store import names
 from ..store.mesh_data import set_key_coordinates
 from ..store.records import Chain
@@ -31,9 +31,9 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
     InputError
         If a generated key was deleted, or the slider cannot play anything; nothing was made.
     """
-    control = shape_keys.control_of(obj, chain)
+    control = chain_keys.control_of(obj, chain)
     control.require()
-    shapes = shape_keys.step_shapes(obj, chain)
+    shapes = chain_shapes.step_shapes(obj, chain)
     is_smooth = len(chain.corners) < chain.intervals - 1
     places = _denser(chain.places) if is_smooth else np.array(chain.places)
     shapes = np.where(

@@ -12,7 +12,7 @@ import bpy
 from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
-from ..keys import drivers, shape_keys, slider
+from ..keys import chain_keys, drivers, slider
 from ..store.records import Chain
 from .absolute_copy import copied
 
@@ -32,7 +32,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         If the file cannot be written; what was there is kept.
     """
     scene, layer = context.scene, context.view_layer
-    control = shape_keys.control_of(obj, chain)
+    control = chain_keys.control_of(obj, chain)
     with ExitStack() as undo:
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
         undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .. import compat
 from ..bake import bookkeeping
-from ..keys import drivers, shape_keys
+from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control, value_path
 from ..store.records import Chain, Record
 from . import remove
@@ -60,7 +60,7 @@ def bake_to_keyframes(
     control.require()
     # As far as keys can go; what is infinite has no weights.
     values = chain.weights.at(np.clip(positions(context, control, frames), -10.0, 10.0)).clip(-10.0, 10.0)
-    owned = shape_keys.owned_keys(keys, chain)
+    owned = chain_keys.owned_keys(keys, chain)
     notes, animated = [], []
     with ExitStack() as undo:
         for step, key in owned.items():

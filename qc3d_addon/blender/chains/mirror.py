@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ..bake import bookkeeping
-from ..keys import shape_keys
+from ..keys import chain_keys, shape_keys
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
@@ -40,8 +40,8 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
     keys = obj.data.shape_keys
-    steps = shape_keys.all_owned_keys(keys, chain)
-    base = shape_keys.base_key(keys, chain).name
+    steps = chain_keys.all_owned_keys(keys, chain)
+    base = chain_keys.base_key(keys, chain).name
     rest = key_coordinates(obj, keys.reference_key.name)
     ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
     obj.data.edges.foreach_get("vertices", ends)

@@ -12,7 +12,7 @@ import bpy
 from .. import compat
 from ..bake import bookkeeping
 from ..heat_map import heat_map
-from ..keys import drivers, shape_keys
+from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control
 from ..store.records import Chain, Record
 
@@ -31,7 +31,7 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     """
     control = shape_keys.require_removable(obj, chain)
     hide_heat_map(obj, chain)
-    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    shape_keys.remove_keys(obj, list(chain_keys.owned_keys(obj.data.shape_keys, chain).values()))
     notes = remove_slider(control, chain)
     with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
         bookkeeping.forget(obj.data.shape_keys, record, chain, undo)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from .. import compat
 from ..keys import drivers
+from ..keys.chain_keys import control_of
 from ..keys.control import Control
-from ..keys.shape_keys import control_of
 from ..store import id_properties, kept_measures
 from ..store import stored_values as stored
 from ..store.kept_measures import MEASURES

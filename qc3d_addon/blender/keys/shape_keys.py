@@ -12,12 +12,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.errors import InputError, QC3DError
+from ...solver.errors import InputError
 from ..store import names
-from ..store.mesh_data import key_coordinates, set_key_coordinates, shown_coordinates
+from ..store.mesh_data import key_coordinates, set_key_coordinates
 from ..store.records import LEAST_DISTANCE, Chain
 from . import drivers, slider
-from .control import Control, path_of, value_path
+from .chain_keys import base_key, control_of, owned_keys
+from .control import Control
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -28,76 +29,6 @@ class Steps(NamedTuple):
 
     places: tuple[float, ...]
     corners: tuple[int, ...]
-
-
-def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
-    """The shape keys that earlier bakes made for a chain and that are still there, by step.
-
-    A key is owned where the record names it and its driver still reads the control. A name that the record has and the
-    mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver. A key that
-    was moved to the top, where all others refer to it, is the animator's own from then on.
-    """
-    curves = drivers.driven_by(keys, path_of(chain))
-    curves.pop(value_path(keys.reference_key.name), None)
-    owned, missing = {}, []
-    for step, name in chain.keys.items():
-        if name in keys.key_blocks and value_path(name) in curves:
-            owned[step] = keys.key_blocks[name]
-        else:
-            missing.append(step)
-    recorded = set(owned.values())
-    others = [key for key in keys.key_blocks if key not in recorded and value_path(key.name) in curves]
-    weights = chain.weights if missing and others else None
-    for step in missing if weights is not None else ():
-        renamed = [key for key in others if drivers.shows(curves[value_path(key.name)], weights, step)]
-        if len(renamed) == 1:
-            owned[step] = renamed[0]
-    return owned
-
-
-def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
-    """As ``owned_keys``; raises InputError where one is missing."""
-    owned = owned_keys(keys, chain)
-    if owned.keys() != chain.keys.keys():
-        raise InputError(f"Shape keys of '{chain.slider}' were deleted; re-bake it first.")
-    return owned
-
-
-def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
-    """What plays the chain: a key's value, or its slider.
-
-    The slider is that on the object of an earlier bake (objects may share a mesh), else that on ``obj``.
-    """
-    if chain.on_key:
-        return Control(obj.data.shape_keys, chain.on_key)
-    for driver in _drivers(obj.data.shape_keys, chain):
-        owner = driver.variables[0].targets[0].id
-        if isinstance(owner, bpy.types.Object):
-            return Control(owner, chain.slider)
-    return Control(obj, chain.slider)
-
-
-def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
-    """Whether Blender has stopped the chain's drivers, which it does for good where the slider was NaN once."""
-    driver = next(_drivers(keys, chain), None)
-    return driver is not None and not driver.is_valid
-
-
-def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
-    """Start drivers again that Blender has stopped."""
-    for curve in drivers.driven_by(keys, path_of(chain)).values():
-        curve.driver.is_valid = True
-    keys.update_tag()
-
-
-def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
-    """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
-    path = path_of(chain)
-    for name in chain.keys.values():
-        driver = drivers.driver_of(keys, name, path)
-        if driver is not None:
-            yield driver
-    yield from (curve.driver for curve in drivers.driven_by(keys, path).values())
 
 
 def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, int] | None) -> None:
@@ -146,102 +77,6 @@ def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> Control:
         name = control.owner.name
         raise InputError(f"'{name}', which has the slider '{chain.slider}', is linked; make it local first.")
     return control
-
-
-def shapes_by_step(
-    obj: bpy.types.Object, met: dict[int, str], frames: NDArray[np.float64]
-) -> dict[int, NDArray[np.float32]]:
-    """The shapes that a slider of its own needs keys for: every frame but the Basis, which shows where no key is on.
-
-    Parameters
-    ----------
-    met
-        Names of the user's own keys by the step that shows them.
-    frames
-        (k, n, 3) positions from the first key to the last.
-
-    Returns
-    -------
-    (n, 3) float32 positions by step, the user's keys bit for bit.
-
-    Raises
-    ------
-    QC3DError
-        If the frames are not finite positions of the mesh's vertices.
-    """
-    shapes = dict(enumerate(_rounded(obj, frames)))
-    for step, name in met.items():
-        if name == obj.data.shape_keys.reference_key.name:
-            del shapes[step]
-        else:
-            shapes[step] = shown_coordinates(obj, name)
-    return shapes
-
-
-def offsets_by_step(
-    obj: bpy.types.Object, places: tuple[float, ...], frames: NDArray[np.float64]
-) -> dict[int, NDArray[np.float32]]:
-    """What keys that a key's own value plays add to it: at each step, what its frame has beyond the straight blend.
-
-    Parameters
-    ----------
-    places
-        Of the steps, as values of the key.
-    frames
-        (k, n, 3) positions at them, from what the key is relative to up to the key.
-
-    Returns
-    -------
-    (n, 3) float32 by step, absolute positions for keys that are relative to what that key is relative to.
-
-    Raises
-    ------
-    QC3DError
-        If the frames are not finite positions of the mesh's vertices.
-    """
-    at = np.array(places)[:, None, None]
-    offsets = _rounded(obj, frames - at * (frames[-1] - frames[0]))
-    return {step: offsets[step] for step in range(1, len(places) - 1)}
-
-
-def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
-    """(k, n, 3) what a chain's control shows at each of its steps, whatever was sculpted since.
-
-    Raises
-    ------
-    InputError
-        If keys of the chain are missing.
-    """
-    keys = obj.data.shape_keys
-    owned = all_owned_keys(keys, chain)
-    first = key_coordinates(obj, base_key(keys, chain).name).astype(np.float64)
-    # What the key itself adds where its own value plays the chain.
-    whole = shown_coordinates(obj, chain.on_key) - first if chain.on_key else np.zeros_like(first)
-    return np.stack(
-        [
-            (key_coordinates(obj, owned[step].name) if step in owned else first) + place * whole
-            for step, place in enumerate(chain.places)
-        ]
-    )
-
-
-def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:
-    """What the chain's keys are relative to: that of the key that plays them, or the Basis."""
-    key = keys.key_blocks.get(chain.on_key) if chain.on_key else None
-    return keys.reference_key if key is None else key.relative_key
-
-
-def _rounded(obj: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Frames (k, n, 3) as shape keys hold them; raises QC3DError where they cannot."""
-    if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
-        raise QC3DError(
-            f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
-        )
-    with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
-        rounded = frames.astype(np.float32)
-    if not np.isfinite(rounded).all():
-        raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")
-    return np.asarray(rounded)
 
 
 @contextmanager

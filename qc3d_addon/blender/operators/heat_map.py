@@ -13,7 +13,7 @@ from bpy.props import EnumProperty
 from ...solver.errors import InputError, QC3DError
 from ..heat_map import heat_map, legend
 from ..heat_map.colors import MEASURE_ITEMS
-from ..keys.shape_keys import control_of, owned_keys
+from ..keys.chain_keys import control_of, owned_keys
 from ..store.records import Chain
 from ..store.summaries import WorstPlace
 from .common import SLIDER, chosen_chain, poll_chains

@@ -9,7 +9,7 @@ import bpy
 from ...solver.errors import InputError
 from .. import live_scrub
 from ..heat_map import heat_map
-from ..keys import shape_keys
+from ..keys import chain_keys
 from ..operators.bake_inbetweens import QC3D_OT_rebake
 from ..operators.chains import (
     QC3D_OT_absolute_keys,
@@ -73,13 +73,13 @@ class QC3D_PT_results(bpy.types.Panel):
 def _draw_chain(
     context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
 ) -> None:
-    control = shape_keys.control_of(obj, chain)
+    control = chain_keys.control_of(obj, chain)
     control_problem = control.problem
     if control_problem is None:
         layout.prop(*control.shown, text=control.name, slider=True)
     else:
         draw_sentence(context, layout, control_problem, 'ERROR')
-    if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+    if chain_keys.are_drivers_stopped(obj.data.shape_keys, chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(obj.data.shape_keys, chain)
     buttons = layout.row(align=True)

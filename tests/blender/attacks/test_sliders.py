@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from qc3d_addon.blender import compat, live_scrub
-from qc3d_addon.blender.keys import drivers, shape_keys
+from qc3d_addon.blender.keys import chain_keys, drivers
 from qc3d_addon.blender.keys.control import slider_path
 from qc3d_addon.blender.store.records import Record
 
@@ -199,7 +199,7 @@ def test_a_driver_that_reads_something_else_than_an_object(baked: bpy.types.Obje
         target = curve.driver.variables[0].targets[0]
         target.id_type = "SCENE"
         target.id = bpy.context.scene
-    assert shape_keys.control_of(baked, chain).owner == baked
+    assert chain_keys.control_of(baked, chain).owner == baked
     drawn(baked)
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
     (owner,) = {

@@ -84,14 +84,14 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     missed = fitted.landmark_residual().rms
     if out_of_reach.parts:
         notes.append(
-            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys{out_of_reach.where}: no "
-            "motion of a volume does that, and the mode straight may look no worse."
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys{out_of_reach.where}, which "
+            "no motion of a volume can do. Mode straight may look as good."
         )
     elif missed > _LARGE_RESIDUAL:
         other = " Where a part goes the wrong way round, choose other extra turns." if turned else ""
         notes.append(
-            f"The map misses the second key by {missed:.0%} of its size: no map without folds comes nearer to what the "
-            f"second key crosses or flattens, and the mode straight may look no worse.{other}"
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
+            f"the second key crosses itself or is flattened. Mode straight may look as good.{other}"
         )
     if turned and not options.extra_turns:
         notes.append(

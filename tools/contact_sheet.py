@@ -3,7 +3,8 @@
 """Draw in-betweens side by side: the first key, the in-betweens, the second key, one row for each file.
 
 A file is a baked .blend, with --object, --from and --to to say what to draw, or the FRAMES.npz of ``qc3d interpolate``.
-All rows show the same two keys through the same camera.
+All rows show the same two keys through the same camera. A name that ends in .gif makes a moving picture instead, with
+the rows beside each other.
 
     python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --object Arm --from Basis --to "Bend 90" \\
         --straight --output sheet.png
@@ -20,7 +21,7 @@ from qc3d_addon.solver.errors import InputError, QC3DError
 from qc3d_addon.solver.files.atomic import replacing, require_writable
 from qc3d_addon.solver.files.npz import open_archive, require_file
 from qc3d_paper.drawing.shading import VIEWS, Floats, Ints
-from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
+from qc3d_paper.drawing.sheets import Row, save_animation, save_sheet, straight_blend
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -44,13 +45,13 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--view", choices=["auto", *VIEWS], default="auto")
     parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
     parser.add_argument("--height", type=int, default=220, metavar="PIXELS", help="of one row (default: 220)")
-    parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png")
+    parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png|.gif")
     return parser.parse_args(argv)
 
 
 def _draw(arguments: argparse.Namespace) -> None:
-    if arguments.output.suffix != ".png":
-        raise InputError(f"{arguments.output} is no picture that can be drawn; give a name that ends in .png.")
+    if arguments.output.suffix not in (".png", ".gif"):
+        raise InputError(f"{arguments.output} is not a picture that can be drawn; give a name ending in .png or .gif.")
     require_writable(arguments.output, inputs=[_path(row) for row in arguments.rows])
     rows = [_read(row, arguments) for row in arguments.rows]
     rows = [row._replace(times=row.times[:: arguments.every], frames=row.frames[:: arguments.every]) for row in rows]
@@ -61,8 +62,11 @@ def _draw(arguments: argparse.Namespace) -> None:
         rows = [row.with_scenery(*scenery) for row in rows]
     if arguments.up == "y":
         rows = [row._replace(frames=row.frames[..., [0, 2, 1]] * (1.0, -1.0, 1.0)) for row in rows]
+    if arguments.output.suffix == ".gif" and len({len(row.times) for row in rows}) > 1:
+        raise InputError("The files have different numbers of frames; a moving picture needs equally many.")
     with replacing(arguments.output) as unfinished:
-        save_sheet(rows, arguments.view, arguments.height, unfinished)
+        save = save_animation if arguments.output.suffix == ".gif" else save_sheet
+        save(rows, arguments.view, arguments.height, unfinished)
 
 
 def _path(row: str) -> Path:

@@ -47,7 +47,8 @@ def _run(arguments: argparse.Namespace) -> None:
     if len({arguments.rest, *names}) <= len(names):
         raise InputError("The rest shape and the keys must be different ones; name each once.")
     options = fit_options(arguments)
-    shapes, faces = read_shapes(arguments.shapes, [arguments.rest, *names], pairs=len(names), quality=options.quality)
+    read = [arguments.rest, *names]
+    shapes, faces, _ = read_shapes(arguments.shapes, read, pairs=len(names), quality=options.quality)
     keys = KeysOnBase(shapes[arguments.rest], [shapes[name] for name in names], faces)
     order = None if arguments.find_order else range(len(names))
     with StageBars() as bars:

@@ -15,6 +15,7 @@ Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]
 StretchLaw = Literal["linear", "logarithmic"]
+Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
 
 _MOST_TURNS = 100

@@ -29,8 +29,8 @@ from .fit.fitted_map import FittedMap
 from .frames import task as tasks
 from .frames.bake import Bake, evenly_spaced
 from .frames.task import Outcome, Task
-from .keys.keypair import KeyPair
-from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mode
+from .keys.keypair import KeyPair, consecutive_pairs
+from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
 from .support.progress import Progress, Steps, finish
 
@@ -66,10 +66,31 @@ class Work(Generic[T]):
 
 
 def fit(
-    key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None, **options: Unpack[FitChoices]
+    key0: ArrayLike,
+    key1: ArrayLike,
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
+    **options: Unpack[FitChoices],
 ) -> Work[FittedMap]:
     """The fit of two keys, step by step; see :func:`.api.fit` for the parameters."""
-    return Work(fitting.fit_pair(KeyPair.checked(key0, key1, faces, edges), FitOptions(**options)))
+    return Work(fitting.fit_pair(one_pair(key0, key1, faces, edges, polygons, mirror), FitOptions(**options)))
+
+
+def one_pair(
+    key0: ArrayLike,
+    key1: ArrayLike,
+    faces: ArrayLike,
+    edges: ArrayLike | None,
+    polygons: ArrayLike | None,
+    mirror: Mirror,
+) -> KeyPair:
+    """Two keys as :func:`.api.fit` takes them."""
+    ends = ("first", "second")
+    shapes = dict(zip(ends, (key0, key1), strict=True))
+    return consecutive_pairs(shapes, faces, edges, ends, polygons, mirror)[ends]
 
 
 def bake(
@@ -78,6 +99,8 @@ def bake(
     frames: int | ArrayLike = 5,
     edges: ArrayLike | None = None,
     *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
     mode: Mode = "natural",
     easing: Easing = "linear",
     colliders: Sequence[Collider] = (),
@@ -96,6 +119,8 @@ def bake(
         FrameOptions(mode, easing),
         times_of(frames, len(keys) - 1),
         Collider.joined([part.at_keys(len(keys)) for part in colliders]) if colliders else None,
+        polygons,
+        mirror,
     )
     task.require_memory(machine_limit_mb())
     return Work(_bake_of(tasks.carry_out(task)))

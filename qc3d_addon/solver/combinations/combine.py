@@ -141,7 +141,7 @@ def _unfolded(keys: KeysOnBase, shape: Floats, options: FitOptions) -> Steps[Flo
     """(n, 3) the base carried near a shape (n, 3) by a map without folds; None where none leads there."""
     first = keys.pairs[0]
     try:
-        fitted = yield from fit_pair(KeyPair(keys.base, shape, first.faces, first.edges), options)
+        fitted = yield from fit_pair(KeyPair(keys.base, shape, first.faces, first.edges, first.polygons), options)
     except (InputError, MeshingError):
         return None
     return fitted.embedding.from_cube(fitted.landmarks @ fitted.mapped, 1.0)

@@ -122,7 +122,8 @@ class Composer:
             deformation = TriangleDeformation.between(self._base, self._base, faces)
             springs = edges_without_triangle(self._keys.faces, self._keys.edges, deformation.faces)
             anchors = self._anchor_weights(deformation)
-            surface = MovingSurface(deformation, springs, self._closed, self._free, self._base, anchors)
+            every = (self._keys.faces, np.ones(len(self._keys.faces)))
+            surface = MovingSurface(deformation, springs, self._closed, every, self._free, self._base, anchors)
             self._built = _System(deformation.faces, springs, surface, Averages(deformation, self._base))
         return self._built
 

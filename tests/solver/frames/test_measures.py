@@ -86,5 +86,5 @@ class TestWorstExcess:
 
     def test_no_edges(self) -> None:
         points = np.eye(3)
-        pair = KeyPair(points, points, np.empty((0, 3), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
+        pair = KeyPair.checked(points, points, np.empty((0, 3), dtype=np.int64))
         assert worst_excess(pair, points[None]).excess == 0.0

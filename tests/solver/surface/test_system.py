@@ -28,7 +28,8 @@ def free_vertices(seed: int) -> Bools:
 def surface_of(free: Bools, anchor_weights: Floats, springs: Ints = SPRINGS) -> MovingSurface:
     deformation = TriangleDeformation.between(POINTS, POINTS, FACES)
     closed = ClosedComponents(FACES, np.zeros(COUNT, dtype=np.int64))
-    return MovingSurface(deformation, springs, closed, free, POINTS, anchor_weights)
+    covering = FACES, np.ones(len(FACES))
+    return MovingSurface(deformation, springs, closed, covering, free, POINTS, anchor_weights)
 
 
 def dense_stiffness() -> Floats:

@@ -89,7 +89,7 @@ class _File:
         self._channels = [
             element
             for element in self._objects.inside
-            if element.name == b"Deformer" and element.values[2] == b"BlendShapeChannel" and element.values[0] in of_mesh
+            if element.values[2] == b"BlendShapeChannel" and element.values[0] in of_mesh
         ]
         self._free = 1 + max(int(element.values[0]) for element in self._objects.inside)
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """In-betweens in glTF files: separate targets, and what the rig plays of them written down frame by frame.
 
-glTF blends its targets by weights alone, which no driver moves, and by default Blender exports no animation of keys that
-drivers play. The values of all keys at every frame make the motion the same there.
+glTF blends its targets by weights alone, which no driver moves, and by default Blender exports no animation of keys
+that drivers play. The values of all keys at every frame make the motion the same there.
 """
 
 from __future__ import annotations

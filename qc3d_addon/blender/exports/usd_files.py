@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """In-betweens in USD files: written into what Blender exports, read where Blender drops them.
 
-They are attributes ``inbetweens:NAME`` with a weight, beside the offsets of their blend shape, and readers go straight from
-one to the next (UsdSkel, *Inbetweens*).
+They are attributes ``inbetweens:NAME`` with a weight, beside the offsets of their blend shape, and readers go straight
+from one to the next (UsdSkel, *Inbetweens*).
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError, reason
 from .in_betweens import InBetweens
-
-_NAMESPACE = "inbetweens:"
 
 
 class ReadShape(NamedTuple):
@@ -110,7 +108,7 @@ def read_in_betweens(path: Path, vertices: int) -> list[ReadShape]:
 
 
 def _write_shape(shape: Any, key: InBetweens) -> None:  # noqa: ANN401 - of pxr, which has no types
-    """Put in-betweens beside the offsets of a blend shape, for the same points, or for all where a point is missing."""
+    """Put in-betweens beside the offsets of a blend shape: for the same points, or for all where one is missing."""
     indices = np.array(shape.GetPointIndicesAttr().Get() or (), dtype=np.int64)
     if len(indices):
         moved = np.flatnonzero((key.offsets != 0.0).any(axis=(0, 2)))
@@ -126,10 +124,15 @@ def _write_shape(shape: Any, key: InBetweens) -> None:  # noqa: ANN401 - of pxr,
         between.SetOffsets(_vectors(offsets[indices] if len(indices) else offsets))
 
 
+def safe_name(name: str) -> str:
+    """A name as USD allows it, which is what Blender makes of names of shape keys."""
+    safe = "".join(mark if mark.isascii() and mark.isalnum() else "_" for mark in name)
+    return f"_{safe}" if safe[:1].isdigit() else safe
+
+
 def _token(name: str, place: float) -> str:
-    """A name for an in-between that USD allows, with its place in it as riggers write it."""
-    safe = "".join(mark if mark.isascii() and (mark.isalnum() or mark == "_") else "_" for mark in name)
-    return f"{'' if safe[:1].isalpha() else '_'}{safe}_{format(100.0 * place, '.4g').replace('.', '_')}"
+    """A name for an in-between, with its place in it as riggers write it."""
+    return f"{safe_name(name)}_{format(100.0 * place, '.4g').replace('.', '_')}"
 
 
 def _leave_out(animation: Any, gone: set[str]) -> None:  # noqa: ANN401

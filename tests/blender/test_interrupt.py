@@ -79,7 +79,7 @@ def test_each_ending_of_the_child_leaves_the_file_as_it_was(
     monkeypatch.setattr(client, "CHILD", script)
     before = state()
     with pytest.raises(RuntimeError, match=said):
-        bpy.ops.qc3d.bake_inbetweens(**CHOICES)
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", **CHOICES)
     assert state() == before
     assert list(temporary.iterdir()) == [script]
 

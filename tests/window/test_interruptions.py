@@ -75,7 +75,7 @@ def test_there_is_never_more_than_one_bake(window: Window) -> None:
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
         window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('INVOKE_DEFAULT')")
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
-        window.ask("bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Bend 90')")
+        window.ask("bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Bend 90')")
     assert window.ask("child()") == child
     window.press("Escape")
     window.wait_for("job() is None")

@@ -76,6 +76,8 @@ class PlayedReport:
     ----------
     weights
         ``smooth`` or ``hats``.
+    corners
+        Numbers of the shapes at which the path turns.
     positions
         In how many places it was looked at.
     distance
@@ -96,6 +98,7 @@ class PlayedReport:
     """
 
     weights: str
+    corners: list[int]
     positions: int
     distance: float
     distance_at: float

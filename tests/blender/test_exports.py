@@ -296,3 +296,37 @@ def test_the_operator(played: bpy.types.Object, tmp_path: Path) -> None:
         assert (tmp_path / f"figure{ending}").stat().st_size > 1000
     with pytest.raises(RuntimeError, match="Name a file"):
         bpy.ops.qc3d.export_in_betweens()
+
+
+@pytest.mark.parametrize("half", [False, True], ids=["subdivision", "subdivision of a mirrored half"])
+def test_alembic_has_the_same_vertices_in_every_frame(half: bool, figure: bpy.types.Object, tmp_path: Path) -> None:
+    """Modifiers are evaluated in every frame, and a seam that opens would split vertices."""
+    if half:
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.mesh.bisect(plane_co=(0.0, 0.0, 0.0), plane_no=(0.0, 1.0, 0.0), clear_inner=True)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        for key in figure.data.shape_keys.key_blocks:
+            values = np.empty(3 * len(key.points), dtype=np.float32)
+            key.points.foreach_get("co", values)
+            at = values.reshape(-1, 3)
+            rest = figure.data.shape_keys.reference_key
+            base = np.empty_like(values)
+            rest.points.foreach_get("co", base)
+            at[np.abs(base.reshape(-1, 3)[:, 1]) < 1e-5, 1] = 0.0
+            key.points.foreach_set("co", values)
+        mirror = figure.modifiers.new("Mirror", 'MIRROR')
+        mirror.use_axis = (False, True, False)
+    figure.modifiers.new("Subdivision", 'SUBSURF')
+    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=3) == {"FINISHED"}
+    path = tmp_path / "figure.abc"
+    assert bpy.ops.qc3d.export_alembic(filepath=str(path), frames=9) == {"FINISHED"}
+    bpy.ops.object.select_all(action="DESELECT")
+    assert bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False) == {"FINISHED"}
+    read = bpy.context.selected_objects[0]
+    counts = []
+    for frame in range(1, 10):
+        bpy.context.scene.frame_set(frame)
+        counts.append(len(read.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices))
+    assert len(set(counts)) == 1
+    assert counts[0] > len(figure.data.vertices)

@@ -124,8 +124,8 @@ def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
 @pytest.mark.parametrize(
     ("ending", "sentence"),
     [
-        (signal.SIGKILL, "The process that does the work was ended by SIGKILL; memory may have run out"),
-        (signal.SIGSEGV, "The process that does the work was ended by SIGSEGV"),
+        (signal.SIGKILL, "The background process was ended by SIGKILL; memory may have run out"),
+        (signal.SIGSEGV, "The background process was ended by SIGSEGV"),
         (signal.SIGSTOP, "The work was stopped after its time limit"),
     ],
 )

@@ -53,6 +53,7 @@ def motion(obj: bpy.types.Object, shown: Shown) -> np.ndarray:
     shapes = []
     for frame in range(FIRST, LAST + 1):
         bpy.context.scene.frame_set(frame)
+        shown(obj)  # a second evaluation: see export._settled_values
         shapes.append(shown(obj))
     return np.array(shapes, dtype=float)
 

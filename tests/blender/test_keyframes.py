@@ -73,7 +73,9 @@ def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     bake()
     figure[SLIDER] = 0.25
     figure.keyframe_insert(PATH, frame=7)
-    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, frame_options=FrameOptions("linear"), keyframes=(1, 11), play_on="slider"))
+    linear = FrameOptions("linear")
+    request = BakeRequest(("Basis", "Lean"), 1, frame_options=linear, keyframes=(1, 11), play_on="slider")
+    result = bake_object(figure, request)
     assert keyframes(figure) == [(7.0, 0.25)]
     assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
 

@@ -188,12 +188,11 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
     """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
     notes = []
-    for key in stale:
-        drivers.undrive(key)
     read = drivers.paths_read(obj.data.shape_keys) if stale else {}
     for key in stale:
         readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
         if readers:
+            drivers.undrive(key)
             key.value = 0.0
             what = "driver reads" if readers == 1 else "drivers read"
             notes.append(f"Key '{key.name}' stays, switched off, since {readers} {what} it.")

@@ -36,6 +36,7 @@ BLENDER_FLOORS = (
     ("heat_map",),
     ("bake",),
     ("chains", "live_scrub", "properties"),
+    ("exports",),
     ("operators",),
     ("ui",),
     ("cli",),

@@ -127,6 +127,18 @@ def bake_file(
     return [result for result, _ in done.values()]
 
 
+def opened_object(path: Path, name: str) -> bpy.types.Object:
+    """An object of a .blend file, which is opened in place of what is open; scripts in it do not run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or has no such object.
+    """
+    _open(path)
+    return _objects(path, [name])[0]
+
+
 def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
     """The objects of these names, or all meshes with keys that do not share their mesh with one before."""
     meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH']

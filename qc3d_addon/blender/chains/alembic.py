@@ -58,7 +58,12 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
             native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
-                    filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
+                    filepath=str(unfinished),
+                    start=1,
+                    end=frames,
+                    selected=True,
+                    apply_subdiv=True,  # else a Subdivision modifier at the end is left out
+                    as_background_job=False,
                 )
             except RuntimeError as error:
                 words = native_files.words(error, unfinished, path)

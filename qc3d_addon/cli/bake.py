@@ -38,9 +38,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("file", type=Path, metavar="FILE.blend", help="a file with a mesh that has two shape keys")
     objects = command.add_mutually_exclusive_group(required=True)
     objects.add_argument(
-        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; once for each"
+        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; repeat for more"
     )
-    objects.add_argument("--all-objects", action="store_true", help="every mesh with two shape keys or more")
+    objects.add_argument("--all-objects", action="store_true", help="all meshes with two or more shape keys")
     add_way(command, "shape key", is_required=False)
     command.add_argument(
         "--on-key",
@@ -48,30 +48,30 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         action="append",
         default=[],
         metavar="KEY",
-        help="a shape key whose own value is to play in-betweens from what it is relative to; once for each",
+        help="a shape key whose own value will play in-betweens, from the key that it is relative to; repeat for more",
     )
-    command.add_argument("--all-keys", action="store_true", help="the same for every shape key that needs it")
+    command.add_argument("--all-keys", action="store_true", help="like --on-key for all shape keys that need it")
     amount = command.add_mutually_exclusive_group()
     amount.add_argument("--frames", type=frame_count, metavar="N", help="number of in-betweens between every two keys")
     amount.add_argument(
-        "--tolerance", type=float, metavar="T", help="as few in-betweens as play the motion within this distance"
+        "--tolerance", type=float, metavar="T", help="as few in-betweens as keep the motion within this distance"
     )
-    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the file itself")
+    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the input file")
     command.add_argument(
         "--keyframes",
         type=whole_number,
         nargs=2,
         metavar=("FIRST", "LAST"),
-        help="animate what plays them over these frames",
+        help="animate the key or slider that plays the in-betweens over these frames",
     )
     command.add_argument(
         "--play-on",
         choices=("auto", "key", "slider"),
         default="auto",
-        help="what plays them: the last key's own value, or a slider of their own (default: the key where it can be)",
+        help="what plays the in-betweens: the last key's own value or a separate slider (default: the key if possible)",
     )
     command.add_argument(
-        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
+        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not enter"
     )
     add_options(command, FrameOptions, FitOptions, PlayOptions)
     command.set_defaults(run=_run)

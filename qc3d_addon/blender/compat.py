@@ -70,6 +70,35 @@ def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
     return None if curves is None else curves.find(data_path)
 
 
+def is_animated(owner: bpy.types.ID, data_path: str) -> bool:
+    """Whether a property of ``owner`` has keyframes: in its active action, or in a strip of the NLA that is on."""
+    if owner.animation_data is None:
+        return False
+    curve = find_fcurve(owner, data_path)
+    if curve is not None and len(curve.keyframe_points):
+        return True
+    for track in owner.animation_data.nla_tracks:
+        for strip in track.strips if not track.mute else ():
+            curves = _strip_fcurves(strip)
+            if not strip.mute and curves is not None and curves.find(data_path) is not None:
+                return True
+    return False
+
+
+def _strip_fcurves(strip: bpy.types.NlaStrip) -> bpy.types.bpy_prop_collection | None:
+    """The F-curves that a strip of the NLA plays."""
+    if strip.action is None:
+        return None
+    if not hasattr(strip, "action_slot"):  # before 4.4 an action holds its curves itself
+        return strip.action.fcurves
+    if strip.action_slot is None:
+        return None
+    from bpy_extras import anim_utils
+
+    channels = anim_utils.action_get_channelbag_for_slot(strip.action, strip.action_slot)
+    return None if channels is None else channels.fcurves
+
+
 def remove_fcurve(owner: bpy.types.ID, data_path: str) -> None:
     """Remove the F-curve of a property, and the action with it where it holds nothing else and nobody else uses it."""
     curves = _fcurves(owner)

@@ -17,6 +17,7 @@ from .operators.chains import (
     QC3D_OT_absolute_keys,
     QC3D_OT_export_alembic,
     QC3D_OT_mirror,
+    QC3D_OT_play_on_key,
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
@@ -43,6 +44,7 @@ CLASSES = (
     QC3D_OT_select_worst,
     QC3D_OT_live_scrub,
     QC3D_OT_remove,
+    QC3D_OT_play_on_key,
     QC3D_OT_to_keyframes,
     QC3D_OT_absolute_keys,
     QC3D_OT_mirror,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import chain_keys, shape_keys
+from ..keys.sculpted import Sculpted
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
@@ -69,12 +70,15 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
     places = shape_keys.Steps(chain.places, chain.corners)
+    sculpted = Sculpted.of(obj, mirrored)
+    sculpted.require_among(chain.places)
+    shapes, made, _ = sculpted.kept(chain.places, shapes)
     with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
-        bookkeeping.remember(obj, record, mirrored, measures, undo)
+        bookkeeping.remember(obj, record, mirrored, measures, made, undo)
     return mirrored
 
 

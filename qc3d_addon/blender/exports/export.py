@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ...solver.files.atomic import replacing_all, require_writable
+from ...solver.files.atomic import replacing_all, require_room, require_writable
 from .. import native_files
 from ..keys import chain_keys, chain_shapes
 from ..store import checks
@@ -60,10 +60,11 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     require_writable(path)
     names = [key.name for key in obj.data.shape_keys.key_blocks[1:]]
     # Beside its place: exporters write the paths of images relative to the file's own folder.
+    size = 12 * len(obj.data.vertices) * (len(names) + (density + 1) * len(chains))
     with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
         native_files.require_short(unfinished, path)
         if suffix == ".glb":
-            return _export_gltf(obj, chains, unfinished, path)
+            return _export_gltf(obj, chains, unfinished, path, size)
         found = [in_betweens(obj, chain, density) for chain in chains]
         if suffix == ".fbx":
             _called(
@@ -77,6 +78,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 ),
                 unfinished,
                 path,
+                size,
             )
             fbx_files.add_in_betweens(unfinished, obj.data.name, found)
         else:
@@ -86,6 +88,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 ),
                 unfinished,
                 path,
+                size,
             )
             usd_files.add_in_betweens(unfinished, names, len(obj.data.vertices), found)
     return []
@@ -117,12 +120,15 @@ def _chains(obj: bpy.types.Object) -> list[Chain]:
     return chains
 
 
-def _export_gltf(obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path) -> list[str]:
+def _export_gltf(
+    obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path, size: int
+) -> list[str]:
     """Targets as they are in Blender, their weights written down at every frame."""
     _called(
         lambda: bpy.ops.export_scene.gltf(filepath=str(unfinished), export_format='GLB', use_selection=True),
         unfinished,
         path,
+        size,
     )
     frames, values = _values_over_time(obj)
     render = bpy.context.scene.render
@@ -199,8 +205,8 @@ def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: 
     layer.objects.active = active
 
 
-def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path) -> None:
-    """Run one of Blender's exporters.
+def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path, size: int) -> None:
+    """Run one of Blender's exporters, which writes a file of about ``size`` bytes.
 
     Raises
     ------
@@ -213,6 +219,8 @@ def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path) -> N
         raise InputError(f"Blender's exporter for {path.suffix} is switched off; enable its add-on first.") from error
     except RuntimeError as error:
         words = native_files.words(error, unfinished, path)
+        require_room(path, size)  # exporters call a full disk anything
         raise InputError(f"{path} cannot be written: {words}.") from error
     if result != {'FINISHED'} or not unfinished.exists():
+        require_room(path, size)
         raise InputError(f"{path} was not written by Blender's exporter; try another folder.")

@@ -80,8 +80,12 @@ def add_in_betweens(path: Path, names: Sequence[str], vertices: int, found: Sequ
     for prim in stage.Traverse():
         if prim.IsA(skel.Animation):
             _leave_out(skel.Animation(prim), gone)
-    if not stage.GetRootLayer().Save():
-        raise InputError(f"{path.name} cannot be written; make room on the disk.")
+    try:
+        is_saved = stage.GetRootLayer().Save()
+    except Exception as error:  # pxr's own kind
+        raise InputError(f"{path.name} cannot be written: {reason(error)}; choose another place.") from error
+    if not is_saved:
+        raise InputError(f"{path.name} cannot be written; choose another place.")
 
 
 def read_in_betweens(path: Path, vertices: int) -> list[ReadShape]:

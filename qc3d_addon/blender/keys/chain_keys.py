@@ -56,9 +56,14 @@ def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
         return Control(obj.data.shape_keys, chain.on_key)
     for driver in _drivers(obj.data.shape_keys, chain):
         owner = driver.variables[0].targets[0].id
-        if isinstance(owner, bpy.types.Object):
+        if isinstance(owner, bpy.types.Object) and not is_original(obj, owner, chain):
             return Control(owner, chain.slider)
     return Control(obj, chain.slider)
+
+
+def is_original(obj: bpy.types.Object, owner: bpy.types.Object, chain: Chain) -> bool:
+    """Whether ``owner`` is only what ``obj`` was copied from: a script copies the slider, but not what reads it."""
+    return owner.type == 'MESH' and owner.data != obj.data and chain.slider in owner and chain.slider in obj
 
 
 def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:

@@ -119,13 +119,14 @@ def slider_path(name: str) -> str:
 
 def value_path(key_name: str) -> str:
     """The path of a shape key's value from its data block."""
-    return _key_path(key_name, "value")
+    return f"{key_path(key_name)}value"
 
 
 def mute_path(key_name: str) -> str:
     """The path of whether a shape key is muted, from its data block."""
-    return _key_path(key_name, "mute")
+    return f"{key_path(key_name)}mute"
 
 
-def _key_path(key_name: str, what: str) -> str:
-    return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].{what}'
+def key_path(key_name: str) -> str:
+    """What the paths of all properties of a shape key begin with."""
+    return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].'

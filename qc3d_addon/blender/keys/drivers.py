@@ -9,6 +9,8 @@ cubic polynomial with these slopes (Farin 2002, *Curves and Surfaces for CAGD*, 
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import bpy
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import compat
-from .control import Control, mute_path, value_path
+from .control import Control, key_path, mute_path, value_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -100,11 +102,39 @@ def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
 
 
 def undrive(key: bpy.types.ShapeKey) -> None:
-    """Remove the drivers of a shape key, if it has any."""
-    keys = key.id_data
-    for path in (value_path(key.name), mute_path(key.name)):
-        if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
-            keys.driver_remove(path)
+    """Remove all drivers of a shape key."""
+    keys, path = key.id_data, key_path(key.name)
+    if keys.animation_data is not None:
+        for driven in [curve.data_path for curve in keys.animation_data.drivers if curve.data_path.startswith(path)]:
+            keys.driver_remove(driven)
+
+
+def paths_read(keys: bpy.types.Key) -> Counter[str]:
+    """How often drivers of the file read properties of shape keys, by path."""
+    return Counter(
+        target.data_path
+        for curve in all_drivers()
+        for variable in curve.driver.variables
+        for target in variable.targets
+        if target.id == keys
+    )
+
+
+def all_drivers() -> Iterator[bpy.types.FCurve]:
+    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
+    for collection in bpy.data.bl_rna.properties:
+        if collection.type != 'COLLECTION':
+            continue
+        for block in getattr(bpy.data, collection.identifier):
+            owner = block.user if isinstance(block, bpy.types.Key) else block
+            if owner is None or not owner.users:
+                continue
+            animation = getattr(block, "animation_data", None)
+            if animation is not None:
+                yield from animation.drivers
+            tree = getattr(block, "node_tree", None)
+            if tree is not None and tree.animation_data is not None:
+                yield from tree.animation_data.drivers
 
 
 def driver_of(keys: bpy.types.Key, key_name: str, path: str) -> bpy.types.Driver | None:

@@ -18,7 +18,7 @@ from ..store.mesh_data import key_coordinates, set_key_coordinates
 from ..store.records import LEAST_DISTANCE, Chain
 from . import drivers, slider
 from .chain_keys import base_key, control_of, owned_keys
-from .control import Control
+from .control import Control, key_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -37,10 +37,9 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
     Raises
     ------
     InputError
-        If a key that the bake replaces is locked, the slider is not a number any more, or its object or its action is
-        linked.
+        If the slider is not a number any more, or its object or its action is linked.
     """
-    control = _require_unlocked(obj, chain)
+    control = _require_local(obj, chain)
     if control.is_there:
         control.require()
     if keyframes is not None:
@@ -55,7 +54,10 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
     InputError
         If a key is locked, or the slider's object or its action is linked.
     """
-    control = _require_unlocked(obj, chain)
+    for key in owned_keys(obj.data.shape_keys, chain).values():
+        if key.lock_shape:
+            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
+    control = _require_local(obj, chain)
     if chain.keyframes is not None:
         require_action(control.owner)
     return control
@@ -68,10 +70,7 @@ def require_action(block: bpy.types.ID) -> None:
         raise InputError(f"The action '{action.name}' is linked; make it local first.")
 
 
-def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> Control:
-    for key in owned_keys(obj.data.shape_keys, chain).values():
-        if key.lock_shape:
-            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
+def _require_local(obj: bpy.types.Object, chain: Chain) -> Control:
     control = control_of(obj, chain)
     if control.owner.library is not None:
         name = control.owner.name
@@ -180,13 +179,28 @@ def _kept(
     }
 
 
-def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> None:
-    """Remove shape keys with their drivers; the active key stays active where it is not one of them."""
+def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[str]:
+    """Remove shape keys with their drivers; the active key stays active where it is not one of them.
+
+    Returns
+    -------
+    Sentences about keys that stay, switched off, since drivers of the user read them.
+    """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
+    notes = []
+    read = drivers.paths_read(obj.data.shape_keys) if stale else {}
     for key in stale:
-        _remove_key(obj, key)
+        readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
+        if readers:
+            drivers.undrive(key)
+            key.value = 0.0
+            what = "driver reads" if readers == 1 else "drivers read"
+            notes.append(f"Key '{key.name}' stays, switched off, since {readers} {what} it.")
+        else:
+            _remove_key(obj, key)
     _activate(obj, active)
     obj.data.shape_keys.update_tag()
+    return notes
 
 
 def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:

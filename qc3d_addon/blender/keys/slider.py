@@ -54,6 +54,8 @@ def begin_keyframes(
             return None, [f"The {what} is animated already; its keyframes were left as they are."]
         if chain.keyframes == wanted:
             return None, []
+        if [tuple(point.co) for point in existing.keyframe_points] != [*zip(chain.keyframes, (0.0, 1.0), strict=True)]:
+            return None, [f"The keyframes of the {what} were edited, and left as they are."]
     return compat.ensure_fcurve(owner, path, undo), []
 
 

@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
 from .. import live_scrub
-from ..chains import absolute_copy, alembic, keyframes, mirror, remove
+from ..chains import absolute_copy, alembic, keyframes, mirror, remove, to_key
 from ..store.records import Chain, Record
 from .common import SLIDER, chosen_chain, poll_chains
 
@@ -60,6 +60,23 @@ class QC3D_OT_remove(ChainWork, bpy.types.Operator):
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
         notes = remove.remove_chain(obj, record, chain)
         return [*notes, f"The in-betweens of '{chain.slider}' were removed."]
+
+
+class QC3D_OT_play_on_key(ChainWork, bpy.types.Operator):
+    """Let the last key's own value play these in-betweens, in place of their slider"""
+
+    bl_idname = "qc3d.play_on_key"
+    bl_label = "Play on the Key"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        moved, notes = to_key.play_on_key(obj, record, chain)
+        return [*notes, f"The value of '{moved.on_key}' plays the in-betweens."]
 
 
 class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):

@@ -8,13 +8,16 @@ import bpy
 
 from ...solver.errors import InputError
 from .. import live_scrub
+from ..chains import to_key
 from ..heat_map import heat_map
 from ..keys import chain_keys
+from ..keys.double_motion import double_motion
 from ..operators.bake_inbetweens import QC3D_OT_rebake
 from ..operators.chains import (
     QC3D_OT_absolute_keys,
     QC3D_OT_export_alembic,
     QC3D_OT_mirror,
+    QC3D_OT_play_on_key,
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
@@ -67,7 +70,9 @@ class QC3D_PT_results(bpy.types.Panel):
                 self.layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
             return
         for chain in reversed(chains):
-            _draw_chain(context, self.layout.box(), obj, chain)
+            box = self.layout.box()
+            _draw_chain(context, box, obj, chain)
+            _draw_double_motion(context, box, obj, chain, chains)
 
 
 def _draw_chain(
@@ -102,6 +107,17 @@ def _draw_chain(
         column = more.column(align=True)
         for operator, icon in _MORE[1:] if chain.mirror_of else _MORE:
             column.operator(operator.bl_idname, icon=icon).slider = chain.slider
+
+
+def _draw_double_motion(
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, chains: list[Chain]
+) -> None:
+    """What adds to what the control shows, as it is now, and the button that ends it where there is one."""
+    found = double_motion(obj, chain, chains)
+    for sentence in found:
+        draw_sentence(context, layout, sentence, 'ERROR')
+    if found and to_key.problem(obj, chain) is None:
+        layout.operator(QC3D_OT_play_on_key.bl_idname, icon='SHAPEKEY_DATA').slider = chain.slider
 
 
 def _draw_result(

@@ -82,13 +82,14 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     """Seconds from a place of the slider to the mesh that is drawn."""
     import bpy
 
+    from qc3d_addon.blender.kinds import keys_of, mesh_of, present
     from qc3d_addon.blender.store.mesh_data import key_coordinates, set_key_coordinates
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(pair.key0.tolist(), [], pair.faces.tolist())
     obj = bpy.data.objects.new("Object", mesh)
-    bpy.context.collection.objects.link(obj)
+    present(bpy.context.collection).objects.link(obj)
     obj.shape_key_add(name="Basis")
     for step in range(1, BAKED_STEPS + 1):
         key = obj.shape_key_add(name=str(step), from_mix=False)
@@ -100,8 +101,8 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     for number in range(_UPDATES):
         basis = key_coordinates(obj, "Basis")
         set_key_coordinates(preview, basis + curve.beyond_blend(number / _UPDATES, BAKED_STEPS))
-        mesh.shape_keys.update_tag()
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        keys_of(obj).update_tag()
+        evaluated = mesh_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
         evaluated.corner_normals[0].vector.copy()
         marks.append(clock.perf_counter())
     return float(np.median(np.diff(marks)))

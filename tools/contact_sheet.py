@@ -89,6 +89,7 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     """The user's own keys and the in-betweens that were baked between them."""
     import bpy
 
+    from qc3d_addon.blender.kinds import mesh_of
     from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
     from qc3d_addon.blender.store.records import Record
 
@@ -100,26 +101,27 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     obj = bpy.data.objects.get(name)
     keys = getattr(obj and obj.data, "shape_keys", None)
     chain = None if keys is None else Record.read(keys).chain(through)
-    if chain is None:
+    if obj is None or chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
     stride = chain.intervals // (len(through) - 1)
     keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
     steps = sorted(keys)
     frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
-    return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)
+    return Row(label, triangles(mesh_of(obj)).astype(np.int64), np.array(steps) / chain.intervals, frames)
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:
     """Positions and triangles of a mesh in the file that was read last, in the scene's coordinates."""
     import bpy
 
+    from qc3d_addon.blender.kinds import mesh_of
     from qc3d_addon.blender.store.mesh_data import triangles
 
     if name not in bpy.data.objects:
         raise InputError(f"There is no object {name!r}.")
     obj = bpy.data.objects[name]
-    points = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
-    return points, triangles(obj.data).astype(np.int64)
+    points = np.array([obj.matrix_world @ vertex.co for vertex in mesh_of(obj).vertices])
+    return points, triangles(mesh_of(obj)).astype(np.int64)
 
 
 if __name__ == "__main__":

@@ -6,16 +6,18 @@
 
 import contextlib
 from dataclasses import fields
-from typing import get_args, get_type_hints
+from inspect import get_annotations
+from typing import Annotated, Any, get_args, get_type_hints
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import Easing, Engine, FitOptions, FrameOptions, Mode, Quality, StretchLaw
 from .bake.request import BakeRequest
 from .heat_map import heat_map
 from .heat_map.colors import MEASURE_ITEMS
+from .kinds import expect, keys_of
 from .store import checks
 from .store.names import MAX_STEPS
 from .store.records import Record
@@ -48,11 +50,11 @@ _DESCRIPTIONS = {
     },
 }
 _OPTIONS = (FitOptions, FrameOptions)
-_DEFAULTS = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
+_DEFAULTS: dict[str, Any] = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
 _KINDS = get_type_hints(FitOptions) | get_type_hints(FrameOptions)
 
 
-def _choice(setting: str, description: str) -> object:
+def _choice(setting: str, description: str) -> Any:  # noqa: ANN401 - what it is only Blender knows
     """A menu of what one of the solver's settings may be."""
     texts = _DESCRIPTIONS[setting]
     return EnumProperty(
@@ -71,16 +73,18 @@ class InnerKey(bpy.types.PropertyGroup):
 class MapChoices:
     """The keys, and everything that the maps between them depend on."""
 
-    from_key: StringProperty(name="From", description="The shape key to start from", options={'SKIP_SAVE'})
-    via: CollectionProperty(
+    from_key: Annotated[str, StringProperty(
+        name="From", description="The shape key to start from", options={'SKIP_SAVE'}
+    )]
+    via: Annotated["bpy.types.bpy_prop_collection_idprop[InnerKey]", CollectionProperty(
         name="Through",
         description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
         type=InnerKey,
         options={'SKIP_SAVE'},
-    )
-    to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
-    stretch: _choice("stretch", "How the mode natural interpolates stretches")
-    extra_turns: IntProperty(
+    )]
+    to_key: Annotated[str, StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})]
+    stretch: Annotated[StretchLaw, _choice("stretch", "How the mode natural interpolates stretches")]
+    extra_turns: Annotated[int, IntProperty(
         name="Extra Turns",
         description="Full turns, between every two keys, that two shapes cannot tell",
         default=_DEFAULTS["extra_turns"],
@@ -89,22 +93,22 @@ class MapChoices:
         soft_min=-5,
         soft_max=5,
         options={'SKIP_SAVE'},
-    )
-    engine: _choice("engine", "What fills the volume around the mesh")
-    quality: _choice("quality", "How fine the volume is")
-    seed: IntProperty(
+    )]
+    engine: Annotated[Engine, _choice("engine", "What fills the volume around the mesh")]
+    quality: Annotated[Quality, _choice("quality", "How fine the volume is")]
+    seed: Annotated[int, IntProperty(
         name="Seed",
         description="Of the samples that the volume is made from",
         default=_DEFAULTS["seed"],
         min=0,
         options={'SKIP_SAVE'},
-    )
+    )]
 
 
 class BakeChoices(MapChoices):
     """The keys, and the in-betweens to make between them."""
 
-    count: IntProperty(
+    count: Annotated[int, IntProperty(
         name="In-Betweens",
         description="Number of in-betweens between every two keys, evenly spaced",
         default=3,
@@ -112,14 +116,14 @@ class BakeChoices(MapChoices):
         max=MAX_STEPS - 1,
         soft_max=20,
         options={'SKIP_SAVE'},
-    )
-    use_tolerance: BoolProperty(
+    )]
+    use_tolerance: Annotated[bool, BoolProperty(
         name="As Few as Needed",
         description="Make as few in-betweens as stay within a tolerance, instead of a fixed number",
         default=False,
         options={'SKIP_SAVE'},
-    )
-    tolerance: FloatProperty(
+    )]
+    tolerance: Annotated[float, FloatProperty(
         name="Tolerance",
         description="How far a vertex may be from where it should be, at any position of the slider; "
         "a length in the object's own units, before its scale",
@@ -131,36 +135,36 @@ class BakeChoices(MapChoices):
         subtype='DISTANCE',
         unit='LENGTH',
         options={'SKIP_SAVE'},
-    )
-    colliders: StringProperty(
+    )]
+    colliders: Annotated[str, StringProperty(
         name="Keep Off",
         description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
         options={'SKIP_SAVE'},
-    )
-    mode: _choice("mode", "How the map between the keys is interpolated")
-    easing: _choice("easing", "How the speed from the first key to the last changes")
-    use_keyframes: BoolProperty(
+    )]
+    mode: Annotated[Mode, _choice("mode", "How the map between the keys is interpolated")]
+    easing: Annotated[Easing, _choice("easing", "How the speed from the first key to the last changes")]
+    use_keyframes: Annotated[bool, BoolProperty(
         name="Keyframes",
         description="Animate the slider from the first key to the last",
         default=False,
         options={'SKIP_SAVE'},
-    )
-    frame_start: IntProperty(
+    )]
+    frame_start: Annotated[int, IntProperty(
         name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
-    )
-    frame_end: IntProperty(
+    )]
+    frame_end: Annotated[int, IntProperty(
         name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
-    )
+    )]
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
     """Let a heat map that is on show the measure that was chosen; where it cannot, its button says why."""
-    obj = settings.id_data
+    obj = expect(bpy.types.Object, settings.id_data)
     state = heat_map.shown(obj)
     if state is None or state.measure == settings.measure or checks.object_problem(obj) is not None:
         return
     with contextlib.suppress(InputError):
-        chain = Record.read(obj.data.shape_keys).chain_of_slider(state.slider)
+        chain = Record.read(keys_of(obj)).chain_of_slider(state.slider)
         if chain is not None:
             heat_map.show(obj, chain, settings.measure)
 
@@ -168,9 +172,30 @@ def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> Non
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
 
-    measure: EnumProperty(
+    measure: Annotated[str, EnumProperty(
         name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
-    )
+    )]
+
+
+SETTINGS = "qc3d"  # the attribute of an object that has them
+
+
+def settings_of(obj: bpy.types.Object) -> ObjectSettings:
+    """The panel's choices for an object."""
+    settings: ObjectSettings = getattr(obj, SETTINGS)
+    return settings
+
+
+def declare(kind: type) -> None:
+    """Let Blender find the properties that a class and its bases name as ``Annotated[type, SomeProperty(...)]``.
+
+    Blender asks for annotations that are the properties themselves, which say nothing of the type that a value has.
+    """
+    for base in kind.__mro__:
+        hints = get_annotations(base)
+        found = {name: hint.__metadata__[0] for name, hint in hints.items() if hasattr(hint, "__metadata__")}
+        if found:
+            base.__annotations__.update(found)
 
 
 # Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class

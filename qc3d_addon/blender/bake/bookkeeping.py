@@ -10,6 +10,7 @@ from itertools import pairwise
 import bpy
 
 from ..heat_map import heat_map
+from ..kinds import keys_of
 from ..store import id_properties, kept_measures
 from ..store.kept_measures import Measures
 from ..store.records import PROPERTY, Chain, Record
@@ -17,7 +18,7 @@ from ..store.records import PROPERTY, Chain, Record
 
 def remember(obj: bpy.types.Object, record: Record, chain: Chain, measures: Measures | None, undo: ExitStack) -> None:
     """Keep the record, and the measures of the chain whose keys were written; show them where its heat map is shown."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     if measures:
         kept_measures.keep(keys, chain.slider, measures, undo)
     else:
@@ -42,7 +43,7 @@ def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -
 
 def forget_all(obj: bpy.types.Object) -> None:
     """Forget all that is kept with the keys of ``obj``, sound or not, and hide its heat map; keys and sliders stay."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     heat_map.hide(obj)
     with ExitStack() as undo:
         for name in [name for name in keys.keys() if name == PROPERTY or name.startswith(f"{PROPERTY}_")]:  # noqa: SIM118

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ...solver.frames.easing import eased
 from ..keys import shape_keys, slider
+from ..kinds import keys_of
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
 from ..store.summaries import Summary
@@ -95,7 +96,7 @@ def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    Record.read(obj.data.shape_keys)
+    Record.read(keys_of(obj))
     pairs = mesh_data.read_pairs(obj, request.keys)
     return Plan(request, Task(pairs, request.keys, request.fit_options), obj.session_uid, obj.name)
 
@@ -114,7 +115,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     pairs = mesh_data.read_pairs(obj, request.keys)
     shape_keys.require_writable(obj, _chain(obj, record, request), request.keyframes)
@@ -140,7 +141,7 @@ def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
     InputError
         If the object cannot be used, or keys that the chain goes through are not there any more.
     """
-    problem = checks.chain_problem(checks.require_object(obj).data.shape_keys, chain)
+    problem = checks.chain_problem(keys_of(checks.require_object(obj)), chain)
     if problem is not None:
         raise InputError(problem)
     return BakeRequest.again(chain.through, chain.request)
@@ -155,7 +156,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
         If the object or the keys cannot be used any more.
     """
     request = request_again(obj, chain)
-    slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
+    slider.require(shape_keys.slider_owner(checks.require_object(obj), chain), chain.slider)
     even = replace(request.frame_options, easing="linear")
     plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, frame_options=even))
     return replace(plan, request=request)
@@ -169,7 +170,7 @@ def write_maps(plan: Plan, outcome: Outcome) -> None:
     InputError
         If the object is gone or was changed meanwhile; it is as it was.
     """
-    keys = plan.find_object().data.shape_keys
+    keys = keys_of(plan.find_object())
     record = Record.read(keys)
     with ExitStack() as undo:
         _keep_maps(keys, record, plan, outcome, undo)
@@ -187,7 +188,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     """
     obj, request, bake = plan.find_object(), plan.request, outcome.bake
     assert bake is not None
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)

@@ -14,6 +14,7 @@ import bpy
 
 from ...solver.errors import InputError
 from .. import native_files
+from ..kinds import keys_of, mesh_of
 from .plan import plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 
@@ -116,7 +117,7 @@ def _save(new: Path, output: Path, size: int) -> None:
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:
-    return len(obj.data.shape_keys.key_blocks) * len(obj.data.vertices) * 12
+    return len(keys_of(obj).key_blocks) * len(mesh_of(obj).vertices) * 12
 
 
 def _open(path: Path) -> None:

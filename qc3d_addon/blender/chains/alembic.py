@@ -13,6 +13,7 @@ from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
 from ..keys import shape_keys, slider
+from ..kinds import keys_of, mesh_of, present
 from ..store.records import Chain
 from .absolute_copy import copied
 
@@ -31,11 +32,11 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
     InputError
         If the file cannot be written; what was there is kept.
     """
-    scene, layer = context.scene, context.view_layer
+    scene, layer = present(context.scene), present(context.view_layer)
     owner = shape_keys.slider_owner(obj, chain)
     with ExitStack() as undo:
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
-        undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
+        undo.callback(_select, layer, set(context.selected_objects or ()), layer.objects.active)
         copy = copied(obj, undo)
         collection = bpy.data.collections.new("QC3D export")
         undo.callback(bpy.data.collections.remove, collection)
@@ -43,7 +44,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         collection.objects.link(copy)
         copy.animation_data_clear()
         copy[chain.slider] = 0.0
-        for driver in slider.driven_by(copy.data.shape_keys, chain.slider).values():
+        for driver in slider.driven_by(keys_of(copy), chain.slider).values():
             if driver.variables[0].targets[0].id == owner:
                 driver.variables[0].targets[0].id = copy
         curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
@@ -78,13 +79,14 @@ def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: in
     show in the viewport what that gives.
     """
     shown = [modifier for modifier in copy.modifiers if modifier.show_render]
-    if shown and shown[-1].type == 'SUBSURF' and shown[-1].subdivision_type == 'CATMULL_CLARK':
+    last = shown[-1] if shown else None
+    if isinstance(last, bpy.types.SubsurfModifier) and last.subdivision_type == 'CATMULL_CLARK':
         shown.pop()
     for modifier in copy.modifiers:
         modifier.show_viewport = modifier in shown
-        if hasattr(modifier, "render_levels"):
+        if isinstance(modifier, (bpy.types.SubsurfModifier, bpy.types.MultiresModifier)):
             modifier.levels = modifier.render_levels
-    mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
+    mesh = mesh_of(copy.evaluated_get(context.evaluated_depsgraph_get()))
     corners = len(mesh.vertices) + len(mesh.loops)
     once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
     return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

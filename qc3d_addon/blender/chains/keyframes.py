@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .. import compat
 from ..bake import bookkeeping
 from ..keys import shape_keys, slider
+from ..kinds import expect, keys_of, present
 from ..store.records import Chain, Record
 from . import remove
 
@@ -25,7 +26,7 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
     InputError
         If there is no such slider, or it is no number at one of the frames.
     """
-    scene = context.scene
+    scene = present(context.scene)
     current, part = scene.frame_current, scene.frame_subframe
     values = []
     try:
@@ -41,7 +42,8 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
 
 def key_values(chain: Chain, step: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) values of the key at a step where the slider is at ``places`` (k,): what its driver gives."""
-    return np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
+    values: NDArray[np.float64] = np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
+    return values
 
 
 def bake_to_keyframes(
@@ -58,7 +60,7 @@ def bake_to_keyframes(
     InputError
         If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
     """
-    keys = obj.data.shape_keys
+    keys, scene = keys_of(obj), present(context.scene)
     owner = shape_keys.require_removable(obj, chain)
     shape_keys.require_action(keys)
     slider.require(owner, chain.slider)
@@ -77,7 +79,7 @@ def bake_to_keyframes(
     remove.hide_heat_map(obj, chain)
     notes += remove.remove_slider(owner, chain)
     keys.update_tag()
-    context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     return notes
 
 
@@ -99,6 +101,7 @@ def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values:
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", np.column_stack([frames, values]).ravel())
-    linear = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items['LINEAR'].value
+    interpolations = expect(bpy.types.EnumProperty, bpy.types.Keyframe.bl_rna.properties["interpolation"])
+    linear = interpolations.enum_items['LINEAR'].value
     curve.keyframe_points.foreach_set("interpolation", [linear] * len(frames))
     curve.update()

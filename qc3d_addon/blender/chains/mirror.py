@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import shape_keys
+from ..kinds import keys_of, mesh_of
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
@@ -35,11 +36,11 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
 
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     steps = shape_keys.all_owned_keys(keys, chain)
     rest = key_coordinates(obj, keys.reference_key.name)
-    ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
-    obj.data.edges.foreach_get("vertices", ends)
+    ends = np.empty(2 * len(mesh_of(obj).edges), dtype=np.int32)
+    mesh_of(obj).edges.foreach_get("vertices", ends)
     partners = mirror_partners(rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64))
     flipped = np.array([-1.0, 1.0, 1.0], dtype=np.float32)
     shapes = {step: key_coordinates(obj, key.name)[partners] * flipped for step, key in steps.items()}

@@ -13,6 +13,8 @@ from .. import compat
 from ..bake import bookkeeping
 from ..heat_map import heat_map
 from ..keys import shape_keys, slider
+from ..kinds import keys_of
+from ..store import id_properties
 from ..store.records import Chain, Record
 
 
@@ -30,21 +32,21 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     """
     owner = shape_keys.require_removable(obj, chain)
     hide_heat_map(obj, chain)
-    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(keys_of(obj), chain).values()))
     notes = remove_slider(owner, chain)
     with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
-        bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
+        bookkeeping.forget(keys_of(obj), record, chain, undo)
         undo.pop_all()
     return notes
 
 
 def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
     """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
-    if chain.slider not in owner:
+    if not id_properties.has(owner, chain.slider):
         return []
     if not slider.is_number(owner, chain.slider):
         return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
-    readers = sum(1 for curve in _drivers() if slider.reads(curve.driver, owner, chain.slider))
+    readers = sum(slider.reads(curve.driver, owner, chain.slider) for curve in _drivers() if curve.driver is not None)
     if readers:
         what = "driver reads" if readers == 1 else "drivers read"
         return [f"The slider '{chain.slider}' stays, since {readers} {what} it."]

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError, QC3DError
-from ..store import names
+from .. import compat
+from ..kinds import keys_of, mesh_of, present
+from ..store import id_properties, names
 from ..store.mesh_data import key_coordinates, set_key_coordinates
 from ..store.records import Chain
 from . import slider
@@ -53,7 +55,7 @@ def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.Sha
 
 def slider_owner(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
     """The object whose slider plays the chain: that of an earlier bake (objects may share a mesh), else ``obj``."""
-    for driver in _drivers(obj.data.shape_keys, chain):
+    for driver in _drivers(keys_of(obj), chain):
         owner = driver.variables[0].targets[0].id
         if isinstance(owner, bpy.types.Object):
             return owner
@@ -92,7 +94,7 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
         linked.
     """
     owner = _require_unlocked(obj, chain)
-    if chain.slider in owner:
+    if id_properties.has(owner, chain.slider):
         slider.require(owner, chain.slider)
     if keyframes is not None:
         require_action(owner)
@@ -112,7 +114,7 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
     return owner
 
 
-def require_action(block: bpy.types.ID) -> None:
+def require_action(block: compat.Animated) -> None:
     """Raise InputError where the keyframes of an object or of shape keys cannot be changed."""
     action = block.animation_data and block.animation_data.action
     if action and (action.library or action.override_library):
@@ -120,7 +122,7 @@ def require_action(block: bpy.types.ID) -> None:
 
 
 def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
-    for key in owned_keys(obj.data.shape_keys, chain).values():
+    for key in owned_keys(keys_of(obj), chain).values():
         if key.lock_shape:
             raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
     owner = slider_owner(obj, chain)
@@ -150,9 +152,9 @@ def shapes_by_step(
     QC3DError
         If the frames are not finite positions of the mesh's vertices.
     """
-    if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
+    if frames.ndim != 3 or frames.shape[1:] != (len(mesh_of(obj).vertices), 3):
         raise QC3DError(
-            f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
+            f"The in-betweens have shape {frames.shape} for {len(mesh_of(obj).vertices)} vertices; please report this."
         )
     with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
         rounded = frames.astype(np.float32)
@@ -160,7 +162,7 @@ def shapes_by_step(
         raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")
     shapes = dict(enumerate(rounded))
     for step, name in met.items():
-        if name == obj.data.shape_keys.reference_key.name:
+        if name == keys_of(obj).reference_key.name:
             del shapes[step]
         else:
             shapes[step] = key_coordinates(obj, name)
@@ -203,12 +205,13 @@ def chain_written(
         If a key or action cannot be written, or the slider is not a number any more.
     """
     require_writable(obj, chain, keyframes)
-    keys, owner = obj.data.shape_keys, slider_owner(obj, chain)
+    keys, owner = keys_of(obj), slider_owner(obj, chain)
     owned = owned_keys(keys, chain)
     kept = {step: key for step, key in owned.items() if chain.intervals == intervals and step in shapes}
     stale = [key for step, key in owned.items() if step not in kept]
     active = obj.active_shape_key
-    curve, notes = None, []
+    curve: bpy.types.FCurve | None = None
+    notes: list[str] = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
         # A slider that starts where it shows the Basis leaves the object looking as it did.
@@ -220,7 +223,7 @@ def chain_written(
             set_key_coordinates(key, shapes[step])
             undo.callback(setattr, key, "relative_key", key.relative_key)
             key.relative_key = keys.reference_key  # another one may have been moved to the top
-            slider.retarget(slider.driver_of(keys, key.name, chain.slider), owner, undo)
+            slider.retarget(present(slider.driver_of(keys, key.name, chain.slider)), owner, undo)
         for step in shapes.keys() - kept.keys():
             name = names.key_name(chain.slider, step, intervals)
             written[step] = _new_key(obj, name, undo)
@@ -234,7 +237,7 @@ def chain_written(
         yield undo, notes
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
-    if curve is not None:
+    if curve is not None and keyframes is not None:
         slider.set_keyframes(curve, keyframes)
     remove_keys(obj, stale)
 
@@ -245,7 +248,7 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> None:
     for key in stale:
         _remove_key(obj, key)
     _activate(obj, active)
-    obj.data.shape_keys.update_tag()
+    keys_of(obj).update_tag()
 
 
 def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
@@ -259,7 +262,7 @@ def _new_key(obj: bpy.types.Object, name: str, undo: ExitStack) -> bpy.types.Sha
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)
     key.value = 0.0  # Blender 5 starts with 1
-    key.relative_key = obj.data.shape_keys.reference_key
+    key.relative_key = keys_of(obj).reference_key
     return key
 
 
@@ -271,4 +274,4 @@ def _remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
 
 
 def _activate(obj: bpy.types.Object, key: bpy.types.ShapeKey | None) -> None:
-    obj.active_shape_key_index = 0 if key is None else obj.data.shape_keys.key_blocks.find(key.name)
+    obj.active_shape_key_index = 0 if key is None else keys_of(obj).key_blocks.find(key.name)

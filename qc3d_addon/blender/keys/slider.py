@@ -10,12 +10,16 @@ slider thus shows the first key from the moment of the bake on. What other keys 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import ExitStack
+from typing import Any
 
 import bpy
 
 from ...solver.errors import InputError
 from .. import compat
+from ..kinds import expect
+from ..store import id_properties
 from ..store.records import Chain
 
 VARIABLE = "slider"
@@ -37,7 +41,7 @@ def expression(step: int, intervals: int) -> str:
 
 def problem(obj: bpy.types.Object, name: str) -> str | None:
     """Why the slider of that name cannot play anything, or None. Quick enough for a panel."""
-    if name not in obj:
+    if not id_properties.has(obj, name):
         return f"The slider '{name}' was deleted; re-bake it first."
     if not is_number(obj, name):
         return (
@@ -63,10 +67,11 @@ def require(obj: bpy.types.Object, name: str) -> None:
 
 def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitStack) -> None:
     """Give ``obj`` the slider; one that is there keeps its value. Closing ``undo`` takes a new one away."""
-    if name not in obj:
+    if not id_properties.has(obj, name):
         undo.callback(obj.pop, name, None)
         obj[name] = start
-        obj.id_properties_ui(name).update(
+        interface: Callable[[str], Any] = obj.id_properties_ui  # the stubs say that it returns nothing
+        interface(name).update(
             min=0.0,
             max=1.0,
             soft_min=0.0,
@@ -81,9 +86,9 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitSt
 
 def drive(key: bpy.types.ShapeKey, obj: bpy.types.Object, name: str, step: int, intervals: int) -> None:
     """Drive the value of a shape key by the slider."""
-    curve = compat.new_driver(key.id_data, value_path(key.name))
-    read_slider(curve.driver, obj, name)
-    curve.driver.expression = expression(step, intervals)
+    driver = compat.new_driver(expect(bpy.types.Key, key.id_data), value_path(key.name))
+    read_slider(driver, obj, name)
+    driver.expression = expression(step, intervals)
 
 
 def read_slider(driver: bpy.types.Driver, obj: bpy.types.Object, name: str) -> None:
@@ -98,7 +103,7 @@ def read_slider(driver: bpy.types.Driver, obj: bpy.types.Object, name: str) -> N
 
 def undrive(key: bpy.types.ShapeKey) -> None:
     """Remove the driver of a shape key's value, if it has one."""
-    keys, path = key.id_data, value_path(key.name)
+    keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
         keys.driver_remove(path)
 
@@ -121,14 +126,16 @@ def value_path(key_name: str) -> str:
 def driver_of(keys: bpy.types.Key, key_name: str, name: str) -> bpy.types.Driver | None:
     """The driver of a shape key's value, where it reads the slider ``name`` alone. Quick enough for a panel."""
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(value_path(key_name))
-    return curve.driver if curve is not None and _reads(curve.driver, name) else None
+    driver = None if curve is None else curve.driver
+    return driver if driver is not None and _reads(driver, name) else None
 
 
 def driven_by(keys: bpy.types.Key, name: str) -> dict[str, bpy.types.Driver]:
     """The drivers that read the slider ``name`` alone, by the path of what they drive."""
     if keys.animation_data is None:
         return {}
-    return {curve.data_path: curve.driver for curve in keys.animation_data.drivers if _reads(curve.driver, name)}
+    drivers = {curve.data_path: curve.driver for curve in keys.animation_data.drivers}
+    return {path: driver for path, driver in drivers.items() if driver is not None and _reads(driver, name)}
 
 
 def reads(driver: bpy.types.Driver, obj: bpy.types.Object, name: str) -> bool:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 
@@ -13,6 +13,8 @@ from ...solver.errors import QC3DError
 from .. import compat, preferences
 from ..bake import jobs, progress_bar
 from ..bake.plan import Plan
+from ..kinds import present
+from .common import OperatorMixin, Status
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -21,14 +23,14 @@ if TYPE_CHECKING:
 _TICK = 0.05  # seconds between looks at the child process
 
 
-class ChildWork:
+class ChildWork(OperatorMixin):
     """Plan the work, let a child process do it, write its outcome; an operator says how by ``plan`` and ``write``.
 
     From a button it is a modal operator that Esc ends; called by a script, or without a window, it runs to its end.
     Nothing is written unless all of the work was done.
     """
 
-    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
+    bl_options = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
     def plan(self, context: bpy.types.Context) -> Plan:
         """What to compute; raises QC3DError where it cannot be done."""
@@ -38,10 +40,10 @@ class ChildWork:
         """Put what came of it into the file; sentences for the user, the last of them what was done."""
         raise NotImplementedError
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         from ...worker import client
 
-        manager = context.window_manager
+        manager = present(context.window_manager)
         try:
             problem = jobs.busy_problem()
             if problem is not None:
@@ -65,7 +67,7 @@ class ChildWork:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
@@ -74,13 +76,14 @@ class ChildWork:
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
-        timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        manager = present(context.window_manager)
+        timer = manager.event_timer_add(_TICK, window=context.window)
         self._job.at_end(partial(_leave_window, timer))
-        context.window_manager.modal_handler_add(self)
+        manager.modal_handler_add(self)
         self._show(context)
         return {'RUNNING_MODAL'}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         if event.type == 'ESC' and event.value == 'PRESS':
             jobs.cancel()
         if self._job.is_cancelled:
@@ -107,7 +110,7 @@ class ChildWork:
         """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
         jobs.cancel()
 
-    def _finish(self, plan: Plan, outcome: Outcome) -> set[str]:
+    def _finish(self, plan: Plan, outcome: Outcome) -> Status:
         *notes, summary = self.write(plan, outcome)
         for note in notes:
             self.report({'WARNING'}, note)
@@ -129,5 +132,5 @@ def raise_input(problem: str) -> None:
 
 
 def _leave_window(timer: bpy.types.Timer) -> None:
-    bpy.context.window_manager.event_timer_remove(timer)
+    present(bpy.context.window_manager).event_timer_remove(timer)
     progress_bar.clear()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ..kinds import keys_of, mesh_of
 from . import checks
 
 if TYPE_CHECKING:
@@ -28,9 +29,9 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPai
     """
     from ...solver.keys.keypair import consecutive_pairs
 
-    checks.require_keys(obj.data.shape_keys, names)
+    checks.require_keys(keys_of(obj), names)
     coordinates = {name: key_coordinates(obj, name) for name in names}
-    return consecutive_pairs(coordinates, triangles(obj.data), wire_edges(obj.data), names)
+    return consecutive_pairs(coordinates, triangles(mesh_of(obj)), wire_edges(mesh_of(obj)), names)
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
@@ -41,8 +42,8 @@ def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     InputError
         If the key holds another number of points than the mesh has vertices.
     """
-    mesh = obj.data
-    points = mesh.shape_keys.key_blocks[name].points
+    mesh = mesh_of(obj)
+    points = keys_of(obj).key_blocks[name].points
     if len(points) != len(mesh.vertices):
         raise InputError(
             f"Shape key '{name}' has {len(points)} points but the mesh has {len(mesh.vertices)} vertices; "
@@ -74,4 +75,5 @@ def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     mesh.loops.foreach_get("edge_index", edge_of_corner)
     is_wire = np.ones(len(mesh.edges), dtype=bool)
     is_wire[edge_of_corner] = False
-    return ends.reshape(-1, 2)[is_wire]
+    wires: NDArray[np.int32] = ends.reshape(-1, 2)[is_wire]
+    return wires

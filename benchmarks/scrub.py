@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast live scrub is, and how near: python -m benchmarks.scrub [FOLDER OF THE DATA].
+"""Speed and accuracy of live scrub: python -m benchmarks.scrub [FOLDER OF THE DATA].
 
-For each pair: the error of the preview against frames computed at times it does not know, the seconds until it shows
-(a child process makes the frames from the kept map) and those of the processor's time among them, its memory, the time
-to evaluate it, and the time of a whole step in Blender, from the slider to the evaluated mesh with its normals, without
-drawing. The last two are medians, which other work on the same machine changes least.
+For each pair: the error of the preview at times between its frames; the seconds until it is ready, for which a child
+process computes the frames from the kept map, and the processor time among them; its memory; the time to evaluate it;
+and the time of a whole step in Blender, from the slider to the evaluated mesh with normals, without drawing. The last
+two are medians, which other work on the same machine affects least.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _processor_seconds() -> float:
-    """Seconds that this process and its children that ended had of the processor."""
+    """Processor seconds used by this process and by its children that have ended."""
     return sum(
         usage.ru_utime + usage.ru_stime
         for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -79,7 +79,7 @@ def _processor_seconds() -> float:
 
 
 def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
-    """Seconds from a place of the slider to the mesh that is drawn."""
+    """Median seconds from moving the slider to the evaluated mesh."""
     import bpy
 
     from qc3d_addon.blender.kinds import keys_of, mesh_of, present

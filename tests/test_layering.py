@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays go down, frames come up: packages import from lower floors only, no two modules import each other in a circle,
-and nothing below the Blender layer knows of Blender."""
+"""The layering of the code: packages import from lower floors only, modules do not import each other in a circle, and
+nothing below the Blender layer imports Blender's modules.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +26,7 @@ SOLVER_FLOORS = (
     ("surface", "collision", "maps"),
     ("fit", "compression"),
     ("frames",),
+    ("combinations",),
     ("steps",),
     ("api",),
 )
@@ -225,3 +227,28 @@ def test_nothing_is_imported_from_the_stubs_at_run_time(repository: Path) -> Non
             if isinstance(node, ast.ImportFrom) and "stub" in (node.module or "") and node not in unseen:
                 found.append(name)
     assert found == []
+
+
+def test_every_property_of_blender_has_its_type_said_beside_it(repository: Path) -> None:
+    """Blender reads the properties of a class, mypy their types: the same names, of kinds that go together."""
+    kinds = {"StringProperty": "str", "IntProperty": "int", "BoolProperty": "bool", "FloatProperty": "float"}
+    count = 0
+    for name, _, source in modules(repository):
+        for kind in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)):
+            for choice in kind.body:
+                if isinstance(choice, ast.If) and choice.orelse:
+                    types, properties = _annotations(choice.body), _annotations(choice.orelse)
+                    assert list(types) == list(properties), f"{name}.{kind.name}"
+                    for key, value in properties.items():
+                        expected = kinds.get(value.split("(")[0])
+                        assert expected in (None, types[key]), f"{name}.{kind.name}.{key}"
+                    count += len(properties)
+    assert count > 20
+
+
+def _annotations(statements: list[ast.stmt]) -> dict[str, str]:
+    return {
+        ast.unparse(statement.target): ast.unparse(statement.annotation)
+        for statement in statements
+        if isinstance(statement, ast.AnnAssign)
+    }

@@ -4,7 +4,7 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty
@@ -23,21 +23,25 @@ class QC3DPreferences(bpy.types.AddonPreferences):
 
     bl_idname = _PACKAGE
 
-    time_limit: Annotated[int, IntProperty(
-        name="Time Limit",
-        description="Minutes after which a bake is stopped",
-        default=_MINUTES,
-        min=1,
-        max=10_000,
-    )]
-    memory_limit: Annotated[int, IntProperty(
-        name="Memory Limit",
-        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is "
-        "not started, and on Linux stopped",
-        default=0,
-        min=0,
-        max=10_000_000,
-    )]
+    if TYPE_CHECKING:
+        time_limit: int
+        memory_limit: int
+    else:
+        time_limit: IntProperty(
+            name="Time Limit",
+            description="Minutes after which a bake is stopped",
+            default=_MINUTES,
+            min=1,
+            max=10_000,
+        )
+        memory_limit: IntProperty(
+            name="Memory Limit",
+            description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more "
+            "is not started, and on Linux stopped",
+            default=0,
+            min=0,
+            max=10_000_000,
+        )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = present(self.layout)

@@ -6,8 +6,7 @@
 
 import contextlib
 from dataclasses import fields
-from inspect import get_annotations
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -73,88 +72,109 @@ class InnerKey(bpy.types.PropertyGroup):
 class MapChoices:
     """The keys, and everything that the maps between them depend on."""
 
-    from_key: Annotated[str, StringProperty(
-        name="From", description="The shape key to start from", options={'SKIP_SAVE'}
-    )]
-    via: Annotated["bpy.types.bpy_prop_collection_idprop[InnerKey]", CollectionProperty(
-        name="Through",
-        description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
-        type=InnerKey,
-        options={'SKIP_SAVE'},
-    )]
-    to_key: Annotated[str, StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})]
-    stretch: Annotated[StretchLaw, _choice("stretch", "How the mode natural interpolates stretches")]
-    extra_turns: Annotated[int, IntProperty(
-        name="Extra Turns",
-        description="Full turns, between every two keys, that two shapes cannot tell",
-        default=_DEFAULTS["extra_turns"],
-        min=-100,
-        max=100,
-        soft_min=-5,
-        soft_max=5,
-        options={'SKIP_SAVE'},
-    )]
-    engine: Annotated[Engine, _choice("engine", "What fills the volume around the mesh")]
-    quality: Annotated[Quality, _choice("quality", "How fine the volume is")]
-    seed: Annotated[int, IntProperty(
-        name="Seed",
-        description="Of the samples that the volume is made from",
-        default=_DEFAULTS["seed"],
-        min=0,
-        options={'SKIP_SAVE'},
-    )]
+    if TYPE_CHECKING:
+        from_key: str
+        via: "bpy.types.bpy_prop_collection_idprop[InnerKey]"
+        to_key: str
+        stretch: StretchLaw
+        extra_turns: int
+        engine: Engine
+        quality: Quality
+        seed: int
+    else:
+        from_key: StringProperty(
+            name="From", description="The shape key to start from", options={'SKIP_SAVE'}
+        )
+        via: CollectionProperty(
+            name="Through",
+            description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
+            type=InnerKey,
+            options={'SKIP_SAVE'},
+        )
+        to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
+        stretch: _choice("stretch", "How the mode natural interpolates stretches")
+        extra_turns: IntProperty(
+            name="Extra Turns",
+            description="Full turns, between every two keys, that two shapes cannot tell",
+            default=_DEFAULTS["extra_turns"],
+            min=-100,
+            max=100,
+            soft_min=-5,
+            soft_max=5,
+            options={'SKIP_SAVE'},
+        )
+        engine: _choice("engine", "What fills the volume around the mesh")
+        quality: _choice("quality", "How fine the volume is")
+        seed: IntProperty(
+            name="Seed",
+            description="Of the samples that the volume is made from",
+            default=_DEFAULTS["seed"],
+            min=0,
+            options={'SKIP_SAVE'},
+        )
 
 
 class BakeChoices(MapChoices):
     """The keys, and the in-betweens to make between them."""
 
-    count: Annotated[int, IntProperty(
-        name="In-Betweens",
-        description="Number of in-betweens between every two keys, evenly spaced",
-        default=3,
-        min=1,
-        max=MAX_STEPS - 1,
-        soft_max=20,
-        options={'SKIP_SAVE'},
-    )]
-    use_tolerance: Annotated[bool, BoolProperty(
-        name="As Few as Needed",
-        description="Make as few in-betweens as stay within a tolerance, instead of a fixed number",
-        default=False,
-        options={'SKIP_SAVE'},
-    )]
-    tolerance: Annotated[float, FloatProperty(
-        name="Tolerance",
-        description="How far a vertex may be from where it should be, at any position of the slider; "
-        "a length in the object's own units, before its scale",
-        default=0.001,
-        min=1e-6,
-        soft_max=1.0,
-        precision=4,
-        step=0.01,
-        subtype='DISTANCE',
-        unit='LENGTH',
-        options={'SKIP_SAVE'},
-    )]
-    colliders: Annotated[str, StringProperty(
-        name="Keep Off",
-        description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
-        options={'SKIP_SAVE'},
-    )]
-    mode: Annotated[Mode, _choice("mode", "How the map between the keys is interpolated")]
-    easing: Annotated[Easing, _choice("easing", "How the speed from the first key to the last changes")]
-    use_keyframes: Annotated[bool, BoolProperty(
-        name="Keyframes",
-        description="Animate the slider from the first key to the last",
-        default=False,
-        options={'SKIP_SAVE'},
-    )]
-    frame_start: Annotated[int, IntProperty(
-        name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
-    )]
-    frame_end: Annotated[int, IntProperty(
-        name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
-    )]
+    if TYPE_CHECKING:
+        count: int
+        use_tolerance: bool
+        tolerance: float
+        colliders: str
+        mode: Mode
+        easing: Easing
+        use_keyframes: bool
+        frame_start: int
+        frame_end: int
+    else:
+        count: IntProperty(
+            name="In-Betweens",
+            description="Number of in-betweens between every two keys, evenly spaced",
+            default=3,
+            min=1,
+            max=MAX_STEPS - 1,
+            soft_max=20,
+            options={'SKIP_SAVE'},
+        )
+        use_tolerance: BoolProperty(
+            name="As Few as Needed",
+            description="Make as few in-betweens as stay within a tolerance, instead of a fixed number",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
+        tolerance: FloatProperty(
+            name="Tolerance",
+            description="How far a vertex may be from where it should be, at any position of the slider; "
+            "a length in the object's own units, before its scale",
+            default=0.001,
+            min=1e-6,
+            soft_max=1.0,
+            precision=4,
+            step=0.01,
+            subtype='DISTANCE',
+            unit='LENGTH',
+            options={'SKIP_SAVE'},
+        )
+        colliders: StringProperty(
+            name="Keep Off",
+            description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
+            options={'SKIP_SAVE'},
+        )
+        mode: _choice("mode", "How the map between the keys is interpolated")
+        easing: _choice("easing", "How the speed from the first key to the last changes")
+        use_keyframes: BoolProperty(
+            name="Keyframes",
+            description="Animate the slider from the first key to the last",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
+        frame_start: IntProperty(
+            name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
+        )
+        frame_end: IntProperty(
+            name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
+        )
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
@@ -172,9 +192,12 @@ def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> Non
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
 
-    measure: Annotated[str, EnumProperty(
-        name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
-    )]
+    if TYPE_CHECKING:
+        measure: str
+    else:
+        measure: EnumProperty(
+            name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
+        )
 
 
 SETTINGS = "qc3d"  # the attribute of an object that has them
@@ -184,18 +207,6 @@ def settings_of(obj: bpy.types.Object) -> ObjectSettings:
     """The panel's choices for an object."""
     settings: ObjectSettings = getattr(obj, SETTINGS)
     return settings
-
-
-def declare(kind: type) -> None:
-    """Let Blender find the properties that a class and its bases name as ``Annotated[type, SomeProperty(...)]``.
-
-    Blender asks for annotations that are the properties themselves, which say nothing of the type that a value has.
-    """
-    for base in kind.__mro__:
-        hints = get_annotations(base)
-        found = {name: hint.__metadata__[0] for name, hint in hints.items() if hasattr(hint, "__metadata__")}
-        if found:
-            base.__annotations__.update(found)
 
 
 # Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class

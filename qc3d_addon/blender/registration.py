@@ -62,7 +62,6 @@ _commands: list[object] = []
 def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
     for cls in CLASSES:
-        properties.declare(cls)
         bpy.utils.register_class(cls)
     pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
     setattr(bpy.types.Object, properties.SETTINGS, pointer(type=properties.ObjectSettings))

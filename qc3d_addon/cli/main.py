@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
-from . import analyze, bake, compress, interpolate, reconstruct, reproduce, speech
+from . import analyze, bake, combine, compress, interpolate, reconstruct, reproduce, speech
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    for command in (interpolate, bake, analyze, reconstruct, compress, reproduce):
+    for command in (interpolate, combine, bake, analyze, reconstruct, compress, reproduce):
         command.add_to(commands)
     return parser
 

@@ -15,6 +15,7 @@ Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]
 StretchLaw = Literal["linear", "logarithmic"]
+Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
 
 _MOST_TURNS = 100
@@ -132,7 +133,7 @@ class PlayOptions:
         Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
         help; ``count`` is then not looked at.
     weights
-        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbours.
+        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbors.
     also_at
         Positions of more in-betweens, each between 0 and 1.
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw a triangle mesh as a shaded picture: an orthographic camera and a depth buffer in numpy, no window needed."""
+"""Shaded pictures of triangle meshes: an orthographic camera and a depth buffer in numpy; needs no window."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Directions to the camera, z up, and to what the animator calls them; objects look along -y, as Blender's do.
+# Directions toward the camera by name; z is up and objects face -y, as in Blender.
 VIEWS = {"front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0), "three-quarter": (0.6, -0.75, 0.3)}
 
-# Lights as direction (right, up, towards the camera) and strength: key from the upper left, fill from the right.
+# Lights: direction (right, up, toward the camera) and strength. The key light comes from the upper left, the fill light
+# from the right.
 _LIGHTS = (((-0.5, 0.65, 0.6), 0.75), ((0.8, 0.1, 0.5), 0.22))
 _AMBIENT = 0.2
 
@@ -27,9 +28,9 @@ class Camera:
     Parameters
     ----------
     axes : (3, 3)
-        Rows point right, up, and towards the camera.
+        Unit vectors in rows: right, up, and toward the camera.
     low, high : (2,)
-        Corners of what is seen, along right and up.
+        Opposite corners of the visible rectangle, along right and up.
     """
 
     axes: Floats
@@ -38,7 +39,7 @@ class Camera:
 
     @classmethod
     def around(cls, shapes: Floats, view: str, margin: float = 0.04) -> Camera:
-        """A camera that holds all shapes (k, n, 3), from one of ``VIEWS``."""
+        """A camera in the view named, one of ``VIEWS``, that shows all shapes (k, n, 3)."""
         axes = _axes(np.array(VIEWS[view]))
         flat = shapes.reshape(-1, 3) @ axes[:2].T
         low, high = flat.min(axis=0), flat.max(axis=0)
@@ -47,7 +48,7 @@ class Camera:
 
 
 def best_view(key0: Floats, key1: Floats) -> str:
-    """The view of ``VIEWS`` in which the motion from one key to the other is seen best."""
+    """Name of the view in which the motion from one key to the other, both (n, 3), is largest."""
     motion = key1 - key0
     return max(VIEWS, key=lambda view: float(np.linalg.norm(motion @ _axes(np.array(VIEWS[view]))[:2].T)))
 
@@ -67,20 +68,22 @@ def draw(
     ----------
     points : (n, 3)
         Vertex positions.
-    faces : (m, 3)
+    faces : (m, 3) int64
         Triangles; their back sides are drawn darker.
+    camera : Camera
     height : int
-        Rows of the picture; the columns follow from the camera.
-    colour
-        Red, green, blue in 0..1, of the shape or of each triangle (m, 3).
-    background
+        Height of the picture in pixels; its width follows from the camera.
+    colour : (3,) or (m, 3)
+        Red, green, blue in 0..1, for the shape or for each triangle.
+    background : (3,)
         Red, green, blue in 0..1.
-    samples
+    samples : int
         Each pixel is the mean of ``samples`` x ``samples`` points.
 
     Returns
     -------
-    (height, width, 3) picture, first row on top.
+    (height, width, 3)
+        The picture, with colors in 0..1, top row first.
     """
     fine = height * samples
     scale = fine / (camera.high[1] - camera.low[1])
@@ -92,7 +95,7 @@ def draw(
     triangle, rows, columns, weights = _covered(spots, faces, fine, width)
     corners = faces[triangle]
     depth = np.einsum("pk,pk->p", weights, seen[corners, 2])
-    # The last write to a pixel stays, so the nearest goes last.
+    # The last write to a pixel stays, so the nearest triangle is written last.
     order = np.argsort(depth, kind="stable")
     nearest = np.full(fine * width, -1, dtype=np.int64)
     nearest[rows[order] * width + columns[order]] = order
@@ -118,7 +121,7 @@ def _axes(towards: Floats) -> Floats:
 
 
 def _vertex_normals(points: Floats, faces: Ints) -> Floats:
-    """(n, 3): area-weighted, not normalised."""
+    """(n, 3) area-weighted vertex normals, not normalized."""
     corners = points[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.stack(
@@ -128,7 +131,7 @@ def _vertex_normals(points: Floats, faces: Ints) -> Floats:
 
 
 def _covered(spots: Floats, faces: Ints, height: int, width: int) -> tuple[Ints, Ints, Ints, Floats]:
-    """Every pixel whose centre a triangle covers: triangle, row, column, and barycentric weights (p, 3)."""
+    """For each pixel center covered by a triangle: the triangle, row, column, and barycentric weights (p, 3)."""
     corners = spots[faces]
     most = np.array([width, height]) - 1
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, most).astype(np.int64)
@@ -160,7 +163,7 @@ def _cross(first: Floats, second: Floats) -> Floats:
 
 
 def _brightness(normals: Floats) -> Floats:
-    """(p,): diffuse light from both lamps, the ambient light, and a faint darkening towards the outline."""
+    """(p,) brightness: diffuse light from both lights, ambient light, and slight darkening toward the outline."""
     light = np.full(len(normals), _AMBIENT)
     for direction, strength in _LIGHTS:
         unit = np.array(direction) / np.linalg.norm(direction)

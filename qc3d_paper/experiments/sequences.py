@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 6 and 7: sequences of faces and of bodies, by the paper's interpolation and by ours."""
+"""Figures 6 and 7 (section 6.1): sequences of faces and of bodies, by the paper's interpolation and by ours."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .shapes import Pose
 
 MODES: tuple[Mode, ...] = ("linear", "natural")
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
-_MILD = 0.05  # what an eye forgives: lengths 5 % beyond those of the keys
+_MILD = 0.05  # edge lengths up to 5 % beyond those of the keys are taken as natural
 _CLAIMS = {
     "6": "Mild sequences, faces: interpolating the representation linearly gives natural shapes in between.",
     "7": "Extreme sequences, bodies: interpolating the representation linearly gives natural shapes in between too.",

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""However a command ends, nothing of it goes on and nothing of it lies about."""
+"""However a command ends, it leaves no process and no temporary file behind."""
 
 from __future__ import annotations
 

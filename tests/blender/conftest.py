@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty scene with the add-on registered around every test, a small figure with shape keys, and a quick map."""
+"""Fixtures for all tests in Blender: an empty scene with the add-on registered, a small figure with shape keys, and a
+fast map.
+"""
 
 from __future__ import annotations
 

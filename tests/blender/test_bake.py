@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baking: the keys that it makes, the slider that plays them, and all that it leaves alone."""
+"""Baking: the keys that it makes, the slider that plays them, and everything that it must not touch."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several keys in a row: one slider meets every key; what changes between two keys is all that is prepared again."""
+"""Chains: one slider meets every key, and only pairs that changed are fitted again."""
 
 from __future__ import annotations
 

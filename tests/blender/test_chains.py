@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be done with in-betweens that were baked: removed, keyframed, copied, mirrored, exported."""
+"""Operations on baked in-betweens: remove, keyframe, copy, mirror, export."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colliders of a bake: which objects, where they are, and what is said where there are none."""
+"""Colliders of a bake: which objects count, where they are, and the messages if there are none."""
 
 from __future__ import annotations
 

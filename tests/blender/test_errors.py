@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever cannot be baked: one sentence that says why, and the file exactly as it was."""
+"""Whatever cannot be baked is refused with one sentence that says why, and the file stays exactly as it was."""
 
 from __future__ import annotations
 

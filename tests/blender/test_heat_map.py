@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map: attributes that follow the slider, and nothing of it left when it is hidden."""
+"""The heat map: attributes that follow the slider, and nothing left behind when it is hidden."""
 
 from __future__ import annotations
 

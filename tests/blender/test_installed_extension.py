@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package for this machine, installed as a user does: nothing of ours on the path, a user folder that is empty."""
+"""The package for this platform, installed as by a user: our sources are not on the path, the user folder is empty."""
 
 from __future__ import annotations
 

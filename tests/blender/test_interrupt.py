@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C while a script bakes, and each ending of the child process: the operator says so, the file is as it was."""
+"""Ctrl-C while a script bakes, and all endings of the child process: a message, and the file as it was."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The slider's keyframes: made on request, never twice, and never in place of the animator's own."""
+"""Keyframes of the slider: made on request, never twice, and never replacing the animator's own."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live scrub shows every moment, and whatever ends it leaves nothing of it."""
+"""Live scrub shows every moment, and leaves nothing behind however it ends."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may happen to an object between the beginning of a bake and its end: each outcome is defined."""
+"""Changes to an object while a bake runs: each has a defined outcome."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of sliders and keys: readable, different, and never longer than Blender keeps."""
+"""Names of sliders and keys: readable, unique, and never longer than Blender keeps."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons that write files, attacked as the commands are in tests/attacks/test_outputs.py."""
+"""Buttons that write files, attacked in the same ways as the commands in tests/attacks/test_outputs.py."""
 
 from __future__ import annotations
 

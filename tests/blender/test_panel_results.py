@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel below the choices shows of each bake."""
+"""The part of the panel that shows the results of each bake."""
 
 from __future__ import annotations
 

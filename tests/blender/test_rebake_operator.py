@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""*Re-Bake*: the same choices again after keys were sculpted, with everything hung on the slider kept."""
+"""*Re-Bake*: the same options again after sculpting, with everything that depends on the slider kept."""
 
 from __future__ import annotations
 

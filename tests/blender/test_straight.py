@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mirrored key: refused at once with the offer of the mode *straight*, which bakes, re-bakes and plays."""
+"""A mirrored key is refused at once with the advice to use mode *straight*, which bakes, re-bakes and plays it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""As few in-betweens as a tolerance needs, as shape keys."""
+"""A tolerance bakes as few in-betweens as it needs, as shape keys."""
 
 from __future__ import annotations
 

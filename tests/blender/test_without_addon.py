@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A saved file opens and plays where there is no add-on and no script may run; saved there, it comes back whole."""
+"""A baked file plays without the add-on and without scripts; saved there, it comes back undamaged."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d analyze`` on keys and on meshes, its files, and what it refuses."""
+"""``qc3d analyze`` on keys and on meshes: its files, and its error messages."""
 
 from __future__ import annotations
 

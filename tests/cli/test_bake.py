@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d bake``: from a .blend file to one with in-betweens, and one sentence where the input is not usable."""
+"""``qc3d bake``: from a .blend file to one with in-betweens, and one sentence for unusable input."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d reconstruct`` on files of every kind it reads, and what it says of those it cannot."""
+"""``qc3d reconstruct`` with every kind of input file, and its error messages."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender with its window for the tests of a module, and in it, for each test, the arm of the demo file."""
+"""A Blender with a window for the tests of a module, and for each test the arm of the demo file in it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake from the panel's button, watched, cancelled, finished, undone, redone and made again."""
+"""A bake started from the panel's button: watched, canceled, finished, undone, redone and repeated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .harness import Window, is_alive, paused, redraws
 BAKE, CANCEL, REBAKE = "qc3d.bake_inbetweens", "qc3d.cancel", "qc3d.rebake"
 OWN = ["Basis", "Bend 90", "Twist 120", "Bend and twist"]
 MADE = [f"Basis→Bend and twist {step}/4" for step in (1, 2, 3, 4)]
-BAR = np.array([71, 114, 179])  # the colour of Blender's progress bars
+BAR = np.array([71, 114, 179])  # the color of Blender's progress bars
 
 
 def start(window: Window) -> int:

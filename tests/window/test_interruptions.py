@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator may do while a bake is at work: nothing crashes, and a sentence says what became of it."""
+"""What an animator may do while a bake runs: nothing crashes, and a sentence says what became of the bake."""
 
 from __future__ import annotations
 

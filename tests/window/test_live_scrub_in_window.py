@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live scrub with its button and the mouse on the slider; how often it is drawn; and undo, which it must survive."""
+"""Live scrub with its button and the mouse on the slider: how often it draws, and that it survives undo."""
 
 from __future__ import annotations
 

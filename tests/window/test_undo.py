@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo and redo of every operator, and undo while a bake is at work: each is one step, and nothing is half undone."""
+"""Undo and redo of all operators, and undo during a bake: each is a single step, and nothing is half undone."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""However the child process ends: one typed error with one sentence, no process and no folder left."""
+"""However the child process ends, there is one typed error with one sentence, and no process or folder is left."""
 
 from __future__ import annotations
 

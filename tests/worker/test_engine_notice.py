@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sentence that says which engine does the work. Stand-ins play the compiled module."""
+"""The sentence that names the engine in use, with stand-ins for the compiled module."""
 
 from __future__ import annotations
 

@@ -232,7 +232,8 @@ def kept_map(ends: tuple[str, str], pair: KeyPair, options: FitOptions) -> KeptM
 
 
 def _same(pair: KeyPair, read: KeyPair) -> bool:
-    return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in ("key0", "key1", "faces", "edges"))
+    arrays = ("key0", "key1", "faces", "edges", "polygons")
+    return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in arrays)
 
 
 def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome, undo: ExitStack) -> None:

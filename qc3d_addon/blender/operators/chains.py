@@ -5,7 +5,7 @@
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
@@ -73,13 +73,18 @@ class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
     bl_idname = "qc3d.to_keyframes"
     bl_label = "Bake to Keyframes"
 
-    slider: SLIDER
-    frame_start: Annotated[int, IntProperty(
-        name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
-    )]
-    frame_end: Annotated[int, IntProperty(
-        name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'}
-    )]
+    if TYPE_CHECKING:
+        slider: SLIDER
+        frame_start: int
+        frame_end: int
+    else:
+        slider: SLIDER
+        frame_start: IntProperty(
+            name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
+        )
+        frame_end: IntProperty(
+            name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'}
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -138,13 +143,20 @@ class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
     bl_label = "Export Alembic"
     bl_options = {'REGISTER'}  # nothing in the file changes
 
-    slider: SLIDER
-    filepath: Annotated[str, StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})]
-    check_existing: Annotated[bool, BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})]
-    filter_glob: Annotated[str, StringProperty(default="*.abc", options={'HIDDEN', 'SKIP_SAVE'})]
-    frames: Annotated[int, IntProperty(
-        name="Frames", description="Frames from the first key to the last", default=25, min=2, max=_MOST_FRAMES
-    )]
+    if TYPE_CHECKING:
+        slider: SLIDER
+        filepath: str
+        check_existing: bool
+        filter_glob: str
+        frames: int
+    else:
+        slider: SLIDER
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        filter_glob: StringProperty(default="*.abc", options={'HIDDEN', 'SKIP_SAVE'})
+        frames: IntProperty(
+            name="Frames", description="Frames from the first key to the last", default=25, min=2, max=_MOST_FRAMES
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

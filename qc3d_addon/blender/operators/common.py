@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import bpy
 from bpy.props import StringProperty
@@ -19,13 +19,13 @@ from ..store.records import Chain, Record
 # What an operator says of itself when it ends, or goes on.
 Status = set[Literal['RUNNING_MODAL', 'CANCELLED', 'FINISHED', 'PASS_THROUGH', 'INTERFACE']]
 
-SLIDER = Annotated[str, StringProperty(
-    name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
-)]
-
-if TYPE_CHECKING:  # to mypy what operators share is an operator; to Blender each of them is
-    OperatorMixin = bpy.types.Operator
+if TYPE_CHECKING:
+    SLIDER = str
+    OperatorMixin = bpy.types.Operator  # to mypy what operators share is an operator; to Blender each of them is
 else:
+    SLIDER = StringProperty(
+        name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
+    )
     OperatorMixin = object
 
 

@@ -4,7 +4,7 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -29,25 +29,30 @@ class QC3D_OT_heat_map(bpy.types.Operator):
     bl_label = "Heat Map"
     bl_options = {"UNDO"}
 
-    slider: SLIDER
-    measure: Annotated[str, EnumProperty(
-        name="Measure",
-        description="What the colours show",
-        items=MEASURE_ITEMS,
-        default="stretch",
-        options={"SKIP_SAVE"},
-    )]
-    show: Annotated[str, EnumProperty(
-        name="Show",
-        description="Whether to show the heat map",
-        items=[
-            ("toggle", "Toggle", "Hide it where it is shown, else show it"),
-            ("on", "On", "Show it"),
-            ("off", "Off", "Hide it"),
-        ],
-        default="toggle",
-        options={"SKIP_SAVE"},
-    )]
+    if TYPE_CHECKING:
+        slider: SLIDER
+        measure: str
+        show: str
+    else:
+        slider: SLIDER
+        measure: EnumProperty(
+            name="Measure",
+            description="What the colours show",
+            items=MEASURE_ITEMS,
+            default="stretch",
+            options={"SKIP_SAVE"},
+        )
+        show: EnumProperty(
+            name="Show",
+            description="Whether to show the heat map",
+            items=[
+                ("toggle", "Toggle", "Hide it where it is shown, else show it"),
+                ("on", "On", "Show it"),
+                ("off", "Off", "Hide it"),
+            ],
+            default="toggle",
+            options={"SKIP_SAVE"},
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -4,7 +4,7 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty
@@ -37,7 +37,10 @@ class QC3D_OT_remove_inner_key(bpy.types.Operator):
     bl_label = "Remove Key Between"
     bl_options = {'UNDO', 'INTERNAL'}
 
-    index: Annotated[int, IntProperty(name="Row", description="Row of the key, from 0", min=0, options={'SKIP_SAVE'})]
+    if TYPE_CHECKING:
+        index: int
+    else:
+        index: IntProperty(name="Row", description="Row of the key, from 0", min=0, options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

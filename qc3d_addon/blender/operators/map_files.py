@@ -5,7 +5,7 @@
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -20,7 +20,10 @@ from .chains import ChainWork
 from .common import SLIDER, Status, poll_active_object, poll_chains
 
 _ENDING = ".qc3dmap"
-_FILTER = Annotated[str, StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})]
+if TYPE_CHECKING:
+    _FILTER = str
+else:
+    _FILTER = StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})
 
 
 class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
@@ -30,10 +33,16 @@ class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
     bl_label = "Save Map"
     bl_options = {'REGISTER'}  # nothing in the file changes
 
-    slider: SLIDER
-    filepath: Annotated[str, StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})]
-    check_existing: Annotated[bool, BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})]
-    filter_glob: _FILTER
+    if TYPE_CHECKING:
+        slider: SLIDER
+        filepath: str
+        check_existing: bool
+        filter_glob: _FILTER
+    else:
+        slider: SLIDER
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        filter_glob: _FILTER
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -57,8 +66,12 @@ class QC3D_OT_load_map(bpy.types.Operator):
     bl_label = "Load Map"
     bl_options = {'REGISTER', 'UNDO'}
 
-    filepath: Annotated[str, StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})]
-    filter_glob: _FILTER
+    if TYPE_CHECKING:
+        filepath: str
+        filter_glob: _FILTER
+    else:
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        filter_glob: _FILTER
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ..kinds import keys_of, mesh_of
 from . import checks
+from .mirror_modifiers import mirror_planes
 
 if TYPE_CHECKING:
     from ...solver.keys.keypair import Ends, KeyPair
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPair]:
     """The pairs of shape keys that follow each other in ``names``, checked, by their names.
+
+    Where Mirror modifiers show the mesh as one half, they are those of the mirrored whole.
 
     Raises
     ------
@@ -31,7 +34,8 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPai
 
     checks.require_keys(keys_of(obj), names)
     coordinates = {name: key_coordinates(obj, name) for name in names}
-    return consecutive_pairs(coordinates, triangles(mesh_of(obj)), wire_edges(mesh_of(obj)), names)
+    mesh, planes = mesh_of(obj), mirror_planes(obj)
+    return consecutive_pairs(coordinates, triangles(mesh), wire_edges(mesh), names, polygons(mesh), planes)
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
@@ -65,6 +69,14 @@ def triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
     return corners.reshape(-1, 3)
+
+
+def polygons(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(m,): the face that each of the ``triangles`` belongs to."""
+    mesh.calc_loop_triangles()
+    owners = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("polygon_index", owners)
+    return owners
 
 
 def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part of a bake that is done once for two keys: the cube filled, the fold-free map fitted."""
+"""The fit of a pair of keys, done once for all its frames: the cube is filled and the fold-free map is fitted."""
 
 from __future__ import annotations
 
@@ -21,24 +21,29 @@ from .continuation import follow_path, path_to
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
 
-# Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
+# As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
 
 
 def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
 
+    Parameters
+    ----------
+    pair : KeyPair
+    options : FitOptions
+
     Raises
     ------
     InputError
-        If more than half of the second key is mirrored, turned inside out or crossed by itself, which no map without
-        folds reaches.
+        If more than half of the second key is mirrored, turned inside out or tangled, which no fold-free map can reach,
+        or if the keys are too large, too small, or of too different sizes.
     MeshingError
-        If the engine asked for cannot fill the cube.
+        If the chosen engine cannot fill the cube.
 
     Notes
     -----
-    Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
+    If only parts of the mesh cannot be reached, the map stays as close as it can and a note says so; in-betweens meet
     both keys all the same.
     """
     require_sizes(pair)
@@ -90,7 +95,7 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
-    """The surface's own path to the second key, and the shapes on it that lead the map."""
+    """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
         path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
         return path, path_to(path, embedding.key1)

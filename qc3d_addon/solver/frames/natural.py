@@ -65,13 +65,13 @@ class NaturalFrames:
 
     @property
     def rows(self) -> Ints:
-        """(m,) the mesh's triangles that have rates: those with an area in both keys."""
+        """(m,) which triangles of the pair's covering have rates: those with an area in both keys."""
         return self._surface.deformation.rows
 
     @property
     def resting(self) -> Bools:
         """(m,) whether a corner of these triangles stays in place."""
-        return np.asarray(self.still[self._fitted.pair.faces[self.rows]].any(axis=1))
+        return np.asarray(self.still[self._fitted.pair.covering[0][self.rows]].any(axis=1))
 
     @property
     def components(self) -> Ints:

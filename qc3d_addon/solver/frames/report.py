@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+from ..keys.halves import on_plane
 from ..keys.keypair import KeyPair
 
 T = TypeVar("T")
@@ -169,6 +170,11 @@ class BakeReport:
         """The report as plain values that can be written as JSON."""
         return asdict(self)
 
+    def of_first(self, count: int) -> BakeReport:
+        """The report where all vertices but the first ``count`` are mirror images of these."""
+        worst = replace(self.worst_stretch, vertex=self.worst_stretch.vertex % count)
+        return replace(self, vertices=count, worst_stretch=worst)
+
     def at(self, chosen: list[int]) -> BakeReport:
         """The report of some of the frames, by their numbers."""
         worst = self.worst_stretch
@@ -203,6 +209,16 @@ def welding_notes(pairs: Sequence[KeyPair]) -> list[str]:
         f"{most} {'vertex differs' if most == 1 else 'vertices differ'} from others by no more than rounding in both "
         "keys and stay together with them, as at a seam."
     ]
+
+
+def mirror_notes(pair: KeyPair) -> list[str]:
+    """A sentence about a mesh that was taken as one half of a mirrored whole."""
+    if not pair.planes:
+        return []
+    count = len(pair.own.key0)
+    held = [np.count_nonzero(on_plane(pair.key0, pair.key1, count, plane)) for plane in range(len(pair.planes))]
+    planes = "a plane" if len(held) == 1 else f"{len(held)} planes"
+    return [f"The mesh moves as one with its mirror image across {planes}; {sum(held)} vertices stay on the seam."]
 
 
 def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:

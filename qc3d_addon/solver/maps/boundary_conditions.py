@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a map is given when it is rebuilt: boundary conditions and landmarks, each coordinate by itself."""
+"""Boundary conditions and landmarks for the reconstruction of a map, separately for each coordinate."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _COORDINATES = "xyz"
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Which coordinates of the map are given, and what they are.
+    """Dirichlet conditions of a map: which coordinates are prescribed at which vertices, and their values.
 
     Parameters
     ----------
     held : (N, 3) bool
-        Whether a coordinate of a vertex's image is given.
+        Whether each coordinate of each vertex's image is prescribed.
     values : (N, 3)
-        The given ones; the others are not looked at.
+        The prescribed values; other entries are ignored.
     """
 
     held: Bools
@@ -35,12 +35,14 @@ class Conditions:
 
     @classmethod
     def none(cls, mesh: TetMesh) -> Conditions:
-        """Nothing is given yet."""
+        """No conditions yet."""
         return cls(np.zeros(mesh.points.shape, dtype=bool), np.array(mesh.points))
 
     @classmethod
     def sliding_cube(cls, mesh: TetMesh) -> Conditions:
-        """Every face of the unit cube slides within itself: u is given on x = 0 and 1, v on y, w on z (section 3.3).
+        """Every face of the unit cube slides within itself: u is fixed on x = 0 and 1, v on y, w on z.
+
+        Chen & Lui, section 5.2.
 
         Raises
         ------
@@ -56,25 +58,25 @@ class Conditions:
 
     @classmethod
     def fixed_boundary(cls, mesh: TetMesh, values: Floats) -> Conditions:
-        """All three coordinates are given at every vertex of the boundary, as in ``values`` (N, 3)."""
+        """All coordinates of all boundary vertices are fixed at ``values`` (N, 3)."""
         held = np.zeros(mesh.points.shape, dtype=bool)
         held[np.unique(mesh.boundary_faces)] = True
         return cls(held, np.array(values))
 
     def with_landmarks(self, vertices: ArrayLike, values: ArrayLike) -> Conditions:
-        """These conditions and landmarks, which count where both give a coordinate.
+        """These conditions together with landmarks, which take precedence where both prescribe a coordinate.
 
         Parameters
         ----------
-        vertices : (k,)
-            Numbers of the landmarks' vertices, from 0.
+        vertices : (k,) int
+            Vertex indices of the landmarks, from 0.
         values : (k, 3)
-            Their images; NaN leaves a coordinate as it is without the landmark.
+            Their images; NaN leaves a coordinate without a landmark.
 
         Raises
         ------
         InputError
-            If a landmark is no vertex or comes twice, or the arrays do not belong together.
+            If an index is out of range or repeated, or if the shapes disagree.
         """
         rows, wanted = np.asarray(vertices), np.asarray(values, dtype=np.float64)
         if rows.ndim != 1 or rows.dtype.kind not in "iu" or wanted.shape != (len(rows), 3):
@@ -92,9 +94,13 @@ class Conditions:
         return Conditions(held, merged)
 
     def require_enough(self, mesh: TetMesh) -> None:
-        """Raise ReconstructionError unless every connected part of the mesh is held so that it cannot become flat.
+        """Check that the conditions determine a map that is not flat on every connected part of the mesh.
 
-        A coordinate that is given nowhere has no solution; one that is given a single value everywhere is constant.
+        Raises
+        ------
+        ReconstructionError
+            If a coordinate is prescribed nowhere on a part, so that it has no unique solution, or has only a single
+            prescribed value there, so that it would be constant.
         """
         part, count = _parts(mesh)
         for coordinate, name in enumerate(_COORDINATES):
@@ -117,7 +123,7 @@ class Conditions:
 
 
 def _parts(mesh: TetMesh) -> tuple[Ints, int]:
-    """The connected part of each vertex, -1 for vertices of no tetrahedron, and the number of parts."""
+    """The connected part (N,) of each vertex, -1 for vertices without a tetrahedron, and the number of parts."""
     count = len(mesh.points)
     rows, columns = np.repeat(mesh.tets[:, 0], 3), mesh.tets[:, 1:].ravel()
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))

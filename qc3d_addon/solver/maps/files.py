@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tetrahedral meshes with values on them, read without trusting them and written whole or not at all.
+"""Files of tetrahedral meshes with data on them.
 
-Files of the ending .npz hold the arrays ``points`` (N, 3) and ``tets`` (M, 4), and any others: of N rows for the
-vertices, of M rows for the tetrahedra. All other endings (.vtu, .vtk, .msh, .mesh, ...) go through meshio.
+An .npz file contains the arrays ``points`` (N, 3) and ``tets`` (M, 4), and any others: arrays with N rows belong to the
+vertices, arrays with M rows to the tetrahedra. Other formats (.vtu, .vtk, .msh, .mesh, ...) are read and written by
+meshio. Files are not trusted when they are read, and written completely or not at all.
 """
 
 from __future__ import annotations
@@ -31,24 +32,24 @@ Arrays = dict[str, NDArray[Any]]
 TARGET = "target"  # images of the vertices
 STRETCH = "stretch"  # representation, first form
 EIGEN_FORM = "eigen_form"  # representation, second form
-# Gmsh's own numbering of a model's parts, which is of no use without the model.
+# Prefix of Gmsh's tags for the entities of a model, which have no meaning without the model.
 _TAGS = "gmsh:"
-# Formats of meshio that hold nothing but the mesh itself.
+# Formats of meshio that cannot store data on the mesh.
 _BARE = {".mesh", ".meshb", ".stl", ".off", ".obj"}
 
 
 @dataclass(frozen=True, eq=False)
 class TetFile:
-    """What a file of tetrahedra holds.
+    """The contents of a file with a tetrahedral mesh.
 
     Parameters
     ----------
     points : (N, 3)
     tets : (M, 4)
     at_vertices : dict
-        Arrays of N rows by name.
+        Arrays with N rows, by name.
     at_tets : dict
-        Arrays of M rows by name.
+        Arrays with M rows, by name.
     """
 
     points: NDArray[Any]
@@ -57,16 +58,16 @@ class TetFile:
     at_tets: Arrays = field(default_factory=dict)
 
     def mesh(self) -> TetMesh:
-        """The mesh by itself; raises InputError where it is none."""
+        """The mesh, validated; raises InputError if the arrays are not a valid mesh."""
         return checked_mesh(self.points, self.tets)
 
     def mapping(self, target: TetFile | None = None) -> Mapping:
-        """The map onto the vertices of another file, or onto the array ``target`` of this one.
+        """The map to the vertices of another file, or to the array ``target`` of this file.
 
         Raises
         ------
         InputError
-            If there is no such array, or the other file has other tetrahedra.
+            If there is no such array, or if the other file has different tetrahedra.
         """
         if target is None:
             if TARGET not in self.at_vertices:
@@ -78,12 +79,12 @@ class TetFile:
 
 
 def read_tets(path: Path) -> TetFile:
-    """Read a tetrahedral mesh and the values on it.
+    """Read a tetrahedral mesh and the data on it.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or holds no tetrahedra.
+        If the file cannot be read or contains no tetrahedra.
     """
     if path.suffix.lower() == ".npz":
         with open_archive(path, "points and tets are needed") as archive:
@@ -94,7 +95,7 @@ def read_tets(path: Path) -> TetFile:
         points, tets = arrays.pop("points"), arrays.pop("tets")
         rows = {name: len(values) if values.ndim else -1 for name, values in arrays.items()}
         at_vertices = {name: values for name, values in arrays.items() if rows[name] == len(points)}
-        # Where there are as many vertices as tetrahedra, an array may be either.
+        # With as many vertices as tetrahedra, an array may belong to either, and is listed for both.
         at_tets = {name: values for name, values in arrays.items() if rows[name] == len(tets)}
         return TetFile(points, tets, at_vertices, at_tets)
     require_file(path)
@@ -114,26 +115,26 @@ def read_tets(path: Path) -> TetFile:
 
 
 def write_tets(path: Path, content: TetFile) -> None:
-    """Write a mesh with its values, whole or not at all; the format follows the ending.
+    """Write a mesh with its data, completely or not at all; the suffix decides the format.
 
-    Formats without values, such as .mesh, get the mesh with its vertices at their images.
+    Formats that cannot store data, such as .mesh, get the mesh with its vertices at their images.
 
     Raises
     ------
     InputError
-        If the file cannot be written, or the ending is unknown.
+        If the file cannot be written or the suffix is unknown.
     """
     with replacing(path) as unfinished:
         put_tets(unfinished, content, path)
 
 
 def put_tets(new: Path, content: TetFile, path: Path) -> None:
-    """As ``write_tets``, straight into the file ``new``, which errors call ``path``.
+    """As ``write_tets``, but directly to the file ``new``; ``path`` is its name in error messages.
 
     Raises
     ------
     InputError
-        If the ending is unknown, or the format has no room for such values.
+        If the suffix is unknown, or if the format cannot store such data.
     OSError
         If the file cannot be written.
     """
@@ -153,12 +154,12 @@ def put_tets(new: Path, content: TetFile, path: Path) -> None:
 
 
 def _format(path: Path) -> str | None:
-    """Two programs use the ending .msh, and meshio would take it for the other one's."""
+    """The format to request from meshio, or None: two programs use .msh, and meshio would assume the other one."""
     return "gmsh" if path.suffix.lower() == ".msh" else None
 
 
 def _padded(values: NDArray[Any]) -> NDArray[Any]:
-    """Gmsh has room for 1, 3 or 9 numbers in a place: six get three zeros behind them."""
+    """Gmsh stores 1, 3 or 9 numbers for each element, so six are padded with three zeros."""
     return np.pad(values, ((0, 0), (0, 3))) if values.ndim == 2 and values.shape[1] == 6 else values
 
 
@@ -179,7 +180,7 @@ def _meshio() -> Any:  # noqa: ANN401 - a module
 
 @contextmanager
 def _meshio_errors(path: Path, done: str) -> Iterator[None]:
-    """One sentence for whatever a damaged file makes meshio do, which may be any error, or to leave the program."""
+    """Turn whatever meshio does with a bad file, any exception or even SystemExit, into a one-sentence InputError."""
     said = StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):

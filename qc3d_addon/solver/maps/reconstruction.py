@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map rebuilt from its representation: the 3D linear Beltrami solver (Chen & Lui, section 3.3).
+"""Reconstruction of a map from its representation (Chen & Lui, sections 5.2 and 5.3).
 
-With A = det(P) P^-2 each coordinate of the map solves div(A grad u) = 0. The three systems share one stiffness matrix
-and differ only in which vertices are held: on the sliding cube u on the faces x = 0 and x = 1, v on y, w on z, and any
-landmarks. The rebuilding of a piecewise linear map is exact up to rounding on the sliding cube, and on any mesh
-whose whole boundary is held.
+With A = det(P) P⁻², each coordinate u of the map solves div(A grad u) = 0. The three systems share one stiffness matrix
+and differ only in their boundary conditions: on the sliding cube u is fixed on the faces x = 0 and x = 1, v on y, w on
+z, and all at landmarks. For a piecewise linear map, the reconstruction is exact up to rounding on the sliding cube and
+on any mesh whose whole boundary is fixed.
 """
 
 from __future__ import annotations
@@ -22,26 +22,27 @@ from .boundary_conditions import Conditions
 from .mapping import Mapping
 from .representation import conductivity
 
-_TOLERANCE = 1e-14
-_MOST_ITERATIONS = 20_000
+_TOLERANCE = 1e-14  # of the size of the terms in each row: about rounding
+_MOST_ITERATIONS = 20_000  # a cap for very distorted representations
 
 
 def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mapping:
-    """The map of any tetrahedral mesh that has a representation and meets conditions of the caller's choice.
+    """Reconstruct the map with a given representation and boundary conditions.
 
     Parameters
     ----------
     mesh : TetMesh
+        Any tetrahedral mesh.
     stretch : (M, 3, 3)
         Symmetric positive definite matrices, one for each tetrahedron.
     conditions : Conditions
-        Where the map is given.
+        Boundary conditions and landmarks.
 
     Raises
     ------
     ReconstructionError
-        If the sizes do not fit, a stretch is not symmetric and positive definite, a part of the mesh is held too
-        little, or the iteration does not converge.
+        If shapes disagree, a stretch is not symmetric positive definite, the conditions do not determine the map, or
+        the iteration does not converge.
     """
     if stretch.shape != (len(mesh.tets), 3, 3):
         raise ReconstructionError(
@@ -57,19 +58,19 @@ def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mappi
 
 
 class Reconstructor:
-    """Rebuilds maps of one tetrahedral mesh; the sparsity pattern and the held rows are set up once.
+    """Reconstructs maps of one tetrahedral mesh. The sparsity pattern and the boundary rows are set up once.
 
     Parameters
     ----------
     mesh : TetMesh
-        Any tetrahedral mesh; the unit cube where ``held`` is not given.
+        Any tetrahedral mesh; a mesh of the unit cube if ``held`` is omitted.
     held : (N, 3) bool, optional
-        Which coordinates of which vertices are given; those of the sliding cube where it is not given.
+        Which coordinates of which vertices are prescribed; by default those of the sliding cube.
 
     Raises
     ------
     ReconstructionError
-        If a coordinate would be held nowhere.
+        If a coordinate is prescribed nowhere.
     """
 
     def __init__(self, mesh: TetMesh, held: Bools | None = None) -> None:
@@ -82,21 +83,21 @@ class Reconstructor:
         self._unused[mesh.tets] = False
 
     def rebuild(self, stretch: Floats, values: Floats, start: Floats | None = None) -> Floats:
-        """The map whose representation is ``stretch``.
+        """Reconstruct the map whose representation is ``stretch``.
 
         Parameters
         ----------
         stretch : (M, 3, 3)
             Symmetric positive definite matrices.
         values : (N, 3)
-            Read only where a coordinate is held.
+            Prescribed values; other entries are ignored.
         start : (N, 3), optional
-            A guess that shortens the iteration; the identity where it is not given. Vertices of no tetrahedron
-            stay there.
+            Initial guess, the identity by default. Vertices without a tetrahedron stay there.
 
         Returns
         -------
-        (N, 3) values of the map at the mesh's vertices.
+        (N, 3)
+            Values of the map at the mesh's vertices.
 
         Raises
         ------
@@ -115,9 +116,9 @@ class Reconstructor:
 
 
 def _solve(matrix: csr_array, free: Bools, column: Floats) -> Floats:
-    """Solve the free rows for their values, the others given; Jacobi-preconditioned conjugate gradients."""
+    """Solve for the free entries of a column by conjugate gradients with Jacobi preconditioning."""
     inner = matrix[free][:, free]
-    # Solving for the correction of the guess keeps the relative tolerance meaningful for good guesses.
+    # Solving for the correction keeps the tolerance meaningful if the initial guess is good.
     residual = -(matrix @ column)[free]
     scale = abs(matrix) @ np.abs(column)
     floor = _TOLERANCE * float(np.linalg.norm(scale[free]))

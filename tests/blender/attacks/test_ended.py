@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender is killed while it bakes, and the add-on is switched off: no process, no file of its own, nothing written."""
+"""Blender is killed during a bake, or the add-on is disabled: no process or file is left, and nothing is written."""
 
 from __future__ import annotations
 

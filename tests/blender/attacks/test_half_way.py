@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever makes several things is stopped at each of its steps in turn: nothing of it is left, at any of them.
+"""Everything that makes several things is stopped at each of its steps in turn: it never leaves half of them.
 
-A step is the call of a function of the add-on. What ends a change (the removal of replaced keys, once all the new is
-there and remembered) is not stopped: it is Blender's own calls in a row, with nothing in between that could fail.
+A step is the call of one of the add-on's functions. The end of a change is not stopped (the removal of replaced keys,
+once everything new exists and is recorded): it consists of Blender's own calls only, none of which can fail.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a heat map keeps in the file, damaged: the panel draws, the map can be hidden and shown again."""
+"""Damaged heat-map data in a file: the panel draws, and the heat map can be hidden and shown again."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters and colliders from libraries that are baked again and reloaded."""
+"""Characters and colliders from linked libraries, re-baked and reloaded."""
 
 from __future__ import annotations
 

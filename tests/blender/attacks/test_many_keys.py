@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh with ten thousand shape keys, and a chain of as many steps as there can be."""
+"""A mesh with ten thousand shape keys, and a chain with the largest number of steps."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records in a .blend that nobody should trust: refused in one sentence with nothing changed, or harmless."""
+"""Hostile records in a .blend file: refused in one sentence without any change, or harmless."""
 
 from __future__ import annotations
 

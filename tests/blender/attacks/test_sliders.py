@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sliders of every type that a custom property can have: what cannot play says so, and what a user put there stays."""
+"""Sliders of every type of custom property: unusable ones are named, and the user's own values stay."""
 
 from __future__ import annotations
 

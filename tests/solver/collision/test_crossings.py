@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Crossing pairs of triangles against every pair tried in exact arithmetic, touching and coplanar ones included."""
+"""Crossing pairs of triangles against exact arithmetic on all pairs, including touching and coplanar ones."""
 
 from __future__ import annotations
 

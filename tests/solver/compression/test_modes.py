@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modes of a mesh and the transfers between tetrahedra and vertices."""
+"""Modes of a mesh, and the transfer between tetrahedra and vertices."""
 
 from __future__ import annotations
 

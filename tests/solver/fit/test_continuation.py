@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Large motions in small steps: maps without folds all the way, turns followed beyond half a turn."""
+"""Large motions in small steps: no folds along the way, and turns beyond half a turn are followed."""
 
 from __future__ import annotations
 

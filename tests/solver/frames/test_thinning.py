@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""As few frames as a tolerance needs."""
+"""A tolerance keeps as few frames as it needs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both keys in the cube and back, the rigid motion between them, and what stays still."""
+"""Both keys in the cube and back, the rigid motion between them, and still vertices."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map comes back from its own representation: exactly, on every kind of mesh."""
+"""A map is reconstructed exactly from its own representation, on every kind of mesh."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much memory a bake needs is known before it starts."""
+"""The memory that a bake needs is known before it starts."""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from qc3d_addon.solver.fit.storage import to_bytes
 from qc3d_addon.solver.frames.bake import evenly_spaced
 from qc3d_addon.solver.frames.preview import PreviewCurve
 from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.frames.weights import Weights
 from qc3d_addon.solver.keys.files import read_pair
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import FitOptions
@@ -33,7 +34,7 @@ from .catalogue import DATA
 
 PAIRS = (("body", "rest", "t_pose"), ("body", "rest", "arms_overhead"), ("head", "neutral", "jawOpen"))
 STEPS = (24, 48)
-BAKED_STEPS = 4
+BAKED = Weights.smooth(np.linspace(0.0, 1.0, 7))
 _BETWEEN = (0.031, 0.17, 0.262, 0.443, 0.51, 0.689, 0.813, 0.987)
 _EVALUATIONS = 200
 _UPDATES = 60
@@ -60,7 +61,7 @@ def main(arguments: list[str]) -> None:
             error = max(np.abs(curve.at(time) - frame).max() for time, frame in zip(_BETWEEN, known, strict=True))
             marks = [clock.perf_counter()]
             for number in range(_EVALUATIONS):
-                curve.beyond_blend(number / _EVALUATIONS, BAKED_STEPS)
+                curve.beyond(number / _EVALUATIONS, BAKED)
                 marks.append(clock.perf_counter())
             print(
                 f"| {file} {first} → {second} | {len(pair.key0)} | {steps} | {error / pair.diagonal:.1e} "
@@ -91,16 +92,16 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     obj = bpy.data.objects.new("Object", mesh)
     present(bpy.context.collection).objects.link(obj)
     obj.shape_key_add(name="Basis")
-    for step in range(1, BAKED_STEPS + 1):
-        key = obj.shape_key_add(name=str(step), from_mix=False)
-        set_key_coordinates(key, curve.at(step / BAKED_STEPS))
+    for knot in BAKED.knots[1:]:
+        key = obj.shape_key_add(name=str(knot), from_mix=False)
+        set_key_coordinates(key, curve.at(knot))
         key.value = 0.5
     preview = obj.shape_key_add(name="Preview", from_mix=False)
     preview.value = 1.0
     marks = [clock.perf_counter()]
     for number in range(_UPDATES):
         basis = key_coordinates(obj, "Basis")
-        set_key_coordinates(preview, basis + curve.beyond_blend(number / _UPDATES, BAKED_STEPS))
+        set_key_coordinates(preview, basis + curve.beyond(number / _UPDATES, BAKED))
         keys_of(obj).update_tag()
         evaluated = mesh_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
         evaluated.corner_normals[0].vector.copy()

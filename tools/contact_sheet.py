@@ -93,8 +93,9 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     """The row of a chain in a .blend file: the user's own keys and the in-betweens baked between them."""
     import bpy
 
+    from qc3d_addon.blender.keys.chain_shapes import step_shapes
     from qc3d_addon.blender.kinds import mesh_of
-    from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+    from qc3d_addon.blender.store.mesh_data import triangles
     from qc3d_addon.blender.store.records import Record
 
     require_file(path)
@@ -104,14 +105,12 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
         raise InputError(f"{path} cannot be opened; it must be a .blend file this Blender can read.") from error
     obj = bpy.data.objects.get(name)
     keys = getattr(obj and obj.data, "shape_keys", None)
-    chain = None if keys is None else Record.read(keys).chain(through)
+    chains = [] if keys is None else Record.read(keys).chains
+    chain = next((chain for chain in chains if chain.through == through), None)
     if obj is None or chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
-    stride = chain.intervals // (len(through) - 1)
-    keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
-    steps = sorted(keys)
-    frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
-    return Row(label, triangles(mesh_of(obj)).astype(np.int64), np.array(steps) / chain.intervals, frames)
+    frames = step_shapes(obj, chain)
+    return Row(label, triangles(mesh_of(obj)).astype(np.int64), np.array(chain.places), frames)
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:

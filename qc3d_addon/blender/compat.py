@@ -55,7 +55,7 @@ def remove_handler(handlers: list[Handler], handler: Handler) -> None:
         handlers.remove(handler)
 
 
-def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.Driver:
+def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     """Add a driver whose value reaches the property unchanged.
 
     A new driver comes with a generator modifier (up to 4.5) or with two Bézier keyframes from (0, 0) to (1, 1) (5.x);
@@ -66,7 +66,7 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.Driver:
         curve.modifiers.remove(curve.modifiers[0])
     while curve.keyframe_points:
         curve.keyframe_points.remove(curve.keyframe_points[0])
-    return present(curve.driver)
+    return curve
 
 
 def clear_shape_keys(obj: bpy.types.Object) -> None:

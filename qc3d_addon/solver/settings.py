@@ -18,6 +18,9 @@ StretchLaw = Literal["linear", "logarithmic"]
 Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
 
+# Frames between every two keys that a tolerance chooses from.
+DENSE_STEPS = 48
+
 _MOST_TURNS = 100
 
 
@@ -143,7 +146,7 @@ class PlayOptions:
         If a value is of the wrong type or out of its range.
     """
 
-    count: int = 3
+    count: int = 5
     tolerance: float = 0.0
     weights: WeightKind = "smooth"
     also_at: tuple[float, ...] = ()

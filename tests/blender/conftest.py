@@ -16,7 +16,8 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
-from qc3d_addon.blender.keys import slider  # noqa: E402
+from qc3d_addon.blender.keys import drivers  # noqa: E402
+from qc3d_addon.blender.keys.control import slider_path  # noqa: E402
 from qc3d_addon.blender.store import records  # noqa: E402
 from qc3d_addon.solver.fit import fit_pair  # noqa: E402
 from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
@@ -207,7 +208,13 @@ def _describe_keys(keys: bpy.types.Key) -> dict[str, Any]:
 @pytest.fixture
 def slider_drivers() -> Callable[[bpy.types.Object, str], dict[str, bpy.types.Driver]]:
     """Gives the drivers of an object's shape keys that read a slider."""
-    return lambda obj, name: slider.driven_by(obj.data.shape_keys, name)
+
+
+    def found(obj: bpy.types.Object, name: str) -> dict[str, bpy.types.Driver]:
+        curves = drivers.driven_by(obj.data.shape_keys, slider_path(name))
+        return {path: curve.driver for path, curve in curves.items()}
+
+    return found
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ State = Callable[[], dict[str, Any]]
 
 
 def bake(**choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(mode="linear", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode="linear", **choices) == {"FINISHED"}
 
 
 @pytest.fixture

@@ -18,7 +18,9 @@ PAIR = {"from_key": "Basis", "to_key": "Lean"}
 
 
 def bake(**choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(**{**PAIR, "count": 1, "mode": 'linear', **choices}) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", **{**PAIR, "count": 1, "mode": 'linear', **choices}
+    ) == {'FINISHED'}
 
 
 def map_properties() -> dict[str, bytes]:

@@ -21,12 +21,14 @@ from qc3d_addon.solver.frames.task import Task
 from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.settings import FitOptions, FrameOptions
 
+from ..command_lines import with_others
+
 QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def interpolate(pair: Path, output: Path, *more: str, first: str = "straight", second: str = "bent") -> int:
     command = ["interpolate", str(pair), "--from", first, "--to", second, "--frames", "1", "--output", str(output)]
-    return main.main([*command, *QUICK, *more])
+    return main.main(with_others([*command, *QUICK], more))
 
 
 def refusal(capsys: pytest.CaptureFixture[str]) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from .harness import Window
 
-SLIDER = "Basis→Bend and twist"
+SLIDER = "Basis_to_Bend and twist"
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import bpy
 from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
-from ..keys import shape_keys, slider
+from ..keys import chain_keys, drivers, slider
 from ..kinds import keys_of, mesh_of, present
 from ..store.records import Chain
 from .absolute_copy import copied
@@ -33,7 +33,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         If the file cannot be written; what was there is kept.
     """
     scene, layer = present(context.scene), present(context.view_layer)
-    owner = shape_keys.slider_owner(obj, chain)
+    control = chain_keys.control_of(obj, chain)
     with ExitStack() as undo:
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
         undo.callback(_select, layer, set(context.selected_objects or ()), layer.objects.active)
@@ -43,11 +43,15 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         scene.collection.children.link(collection)
         collection.objects.link(copy)
         copy.animation_data_clear()
-        copy[chain.slider] = 0.0
-        for driver in slider.driven_by(keys_of(copy), chain.slider).values():
-            if driver.variables[0].targets[0].id == owner:
-                driver.variables[0].targets[0].id = copy
-        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
+        played = control.of(keys_of(copy) if control.is_key else copy)
+        if control.is_key:
+            keys_of(copy).driver_remove(control.path)
+        else:
+            copy[chain.slider] = 0.0
+            for driven in drivers.driven_by(keys_of(copy), control.path).values():
+                if drivers.reads(driven.driver, control):
+                    present(driven.driver).variables[0].targets[0].id = copy
+        curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))

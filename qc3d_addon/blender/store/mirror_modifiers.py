@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -31,7 +31,8 @@ def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
     planes = []
     for modifier in obj.modifiers:
         if isinstance(modifier, bpy.types.MirrorModifier) and modifier.show_viewport:
-            chosen = zip(modifier.use_axis[:], modifier.use_bisect_axis[:], strict=True)
+            axes: tuple[Any, Any] = (modifier.use_axis, modifier.use_bisect_axis)  # no arrays to read in 5.2's stubs
+            chosen = zip(*axes, strict=True)
             for axis, (is_mirrored, is_bisected) in enumerate(chosen):
                 if is_mirrored and not is_bisected:
                     planes.append(_plane(obj, modifier, axis))

@@ -81,13 +81,13 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     missed = fitted.landmark_residual().rms
     if out_of_reach.parts:
         note = (
-            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys: no motion of a volume "
-            "does that, and the mode straight may look no worse."
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys, which no motion of a "
+            "volume can do. Mode straight may look as good."
         )
     elif missed > _LARGE_RESIDUAL:
         note = (
-            f"The map misses the second key by {missed:.0%} of its size: no map without folds comes nearer to what the "
-            "second key crosses or flattens, and the mode straight may look no worse."
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
+            "the second key crosses itself or is flattened. Mode straight may look as good."
         )
     else:
         return fitted

@@ -76,6 +76,8 @@ class PlayedReport:
     ----------
     weights
         ``smooth`` or ``hats``.
+    corners
+        Numbers of the shapes at which the path turns.
     positions
         In how many places it was looked at.
     distance
@@ -96,6 +98,7 @@ class PlayedReport:
     """
 
     weights: str
+    corners: list[int]
     positions: int
     distance: float
     distance_at: float
@@ -238,7 +241,6 @@ def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str 
     if None in crossings:
         notes.append(
             f"Whether the mesh crosses {subject} is not known in {crossings.count(None)} of {len(crossings)} frames: "
-            "so many triangles lie over each other there that looking would take too long; remove those that are "
-            "there many times over."
+            "so many triangles overlap there that searching would take too long; remove repeated triangles."
         )
     return notes

@@ -275,8 +275,8 @@ def require_sizes(pair: KeyPair) -> None:
             )
     if min(sizes) > 0.0 and not 1.0 / _MOST_GROWTH <= sizes[1] / sizes[0] <= _MOST_GROWTH:
         raise InputError(
-            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, more than numbers can hold; "
-            "bring both keys to like sizes, or choose the mode straight."
+            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, too much for "
+            "floating point; bring both keys to similar sizes, or choose the mode straight."
         )
 
 

@@ -58,8 +58,8 @@ def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
     if needed_mb > limit_mb:
         raise InputError(
             f"The bake of {vertices} vertices needs about {needed_mb:.0f} MB of memory, and its limit is "
-            f"{limit_mb:.0f} MB. Allow it more, take fewer in-betweens or keys, or bake a coarser mesh and carry the "
-            "in-betweens over with a Surface Deform modifier."
+            f"{limit_mb:.0f} MB. Raise the limit, use fewer in-betweens or keys, or bake a coarser mesh and transfer "
+            "the in-betweens with a Surface Deform modifier."
         )
 
 

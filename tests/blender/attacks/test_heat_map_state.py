@@ -57,7 +57,7 @@ def shown(figure: bpy.types.Object) -> bpy.types.Object:
     """A bake with its heat map, over a colour of the animator's own."""
     figure.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
     choices = {"mode": "linear", "count": 1}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
     assert bpy.ops.qc3d.heat_map() == {"FINISHED"}
     return figure
 

@@ -115,7 +115,7 @@ class TestWork:
         corners = points.T[:, faces]
         budget = Budget(count)
         budget.left = 1000
-        with pytest.raises(CrowdedError, match=r"lie over each other .* remove triangles that are there many times"):
+        with pytest.raises(CrowdedError, match=r"triangles overlap .* remove repeated triangles"):
             list(tree.meeting(corners.min(axis=2), corners.max(axis=2), budget))
 
 

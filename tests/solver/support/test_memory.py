@@ -105,7 +105,7 @@ def test_frames_to_compress(
 
 
 def test_the_sentence_says_what_to_do() -> None:
-    with pytest.raises(InputError, match=r"Allow it more, take fewer in-betweens or keys, or bake a coarser mesh"):
+    with pytest.raises(InputError, match=r"Raise the limit, use fewer in-betweens or keys, or bake a coarser mesh"):
         require_memory(10.0, 5.0, 3)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d combine``: the shape with two keys or more of an .npz file on at once, or what adding them would do."""
+"""``qc3d combine``: the shape of several keys of an .npz file on at once, and what adding them would do."""
 
 from __future__ import annotations
 
@@ -30,12 +30,16 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("--rest", required=True, metavar="NAME", help="the shape that the keys are relative to")
     command.add_argument("--outer", required=True, metavar="NAME", help="the key that carries the others along")
     command.add_argument(
-        "--inner", required=True, action="append", metavar="NAME", help="a key inside it; again for one inside that"
+        "--inner",
+        required=True,
+        action="append",
+        metavar="NAME",
+        help="a key inside the outer one; repeat for one inside that",
     )
     command.add_argument(
-        "--weights", type=float, nargs="+", metavar="W", help="how much each is on, 0 to 1, in that order (default: 1)"
+        "--weights", type=float, nargs="+", metavar="W", help="weight of each key, 0 to 1, in that order (default: 1)"
     )
-    command.add_argument("--find-order", action="store_true", help="find out which key is the outer one, and say so")
+    command.add_argument("--find-order", action="store_true", help="find the order of the keys instead, and print it")
     command.add_argument("--output", type=Path, required=True, metavar="OUT.npz", help="faces (m, 3), shape (n, 3)")
     add_options(command, FitOptions)
     command.set_defaults(run=_run)
@@ -45,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> None:
     require_writable(arguments.output, inputs=[arguments.shapes])
     names = [arguments.outer, *arguments.inner]
     if len({arguments.rest, *names}) <= len(names):
-        raise InputError("The rest shape and the keys must be different ones; name each once.")
+        raise InputError("The rest shape and the keys must all be different; name each once.")
     options = fit_options(arguments)
     read = [arguments.rest, *names]
     shapes, faces, _ = read_shapes(arguments.shapes, read, pairs=len(names), quality=options.quality)

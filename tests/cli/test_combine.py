@@ -63,7 +63,7 @@ def test_weights(shapes_file: Path, tmp_path: Path) -> None:
     ("more", "outer", "said"),
     [
         ((), "curled", "no shape 'curled'"),
-        ((), "straight", "must be different ones"),
+        ((), "straight", "must all be different"),
         (("--weights", "1"), "raised", "2 keys and 1 weights"),
         (("--weights", "1", "2"), "raised", "weight 2.0"),
     ],

@@ -15,19 +15,21 @@ from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotations import closest_rotations
 from ..triangles.deformation import TriangleDeformation
 
-# Of the diagonal: wider than the lips of a mouth roll, narrower than a joint.
+# Radius of the region, relative to the diagonal: wider than the roll of a lip, narrower than a joint.
 _REGION = 0.03
 
 
 class Averages:
-    """Means around each vertex of what is known of triangles, weighted by area and distance.
+    """Means of triangle quantities over the region around each vertex, weighted by area and distance.
+
+    The weights come from one implicit diffusion step, whose matrix is factored once.
 
     Parameters
     ----------
     deformation : TriangleDeformation
-        Of the triangles, the diagonal as unit.
+        The triangles, in units of the diagonal.
     points : (k, 3)
-        The vertices.
+        The vertices, in the same units.
     """
 
     def __init__(self, deformation: TriangleDeformation, points: Floats) -> None:
@@ -50,7 +52,7 @@ class Averages:
         self._factored = factored(csr_array(diags_array(self._masses) + _REGION**2 * own))
 
     def rotations(self, turned: Floats) -> Floats:
-        """(k, 3, 3) the mean rotation around each vertex of rotations (m, 3, 3) of the triangles."""
+        """(k, 3, 3) mean, around each vertex, of the rotations (m, 3, 3) of the triangles."""
         if not len(self._vertices):
             return np.tile(np.eye(3), (len(self._nearest), 1, 1))
         corners = np.repeat(self._shares[:, None] * turned.reshape(-1, 9), 3, axis=0)
@@ -59,7 +61,7 @@ class Averages:
         return np.asarray(means[self._nearest])
 
     def faded(self, places: Bools) -> Floats:
-        """(k,) 1 at chosen vertices (k,), falling to 0 around them."""
+        """(k,) weights that are 1 at the chosen vertices ``places`` (k,) and fall to 0 around them."""
         if not len(self._vertices):
             return places.astype(np.float64)
         chosen = places[self._order].astype(np.float64)
@@ -70,7 +72,7 @@ class Averages:
         return np.maximum(np.clip(reached / max(least, 1e-300), 0.0, 1.0)[self._nearest], places)
 
     def _spread(self, loads: Floats) -> Floats:
-        """(v, c) what loads (k, c) become, of the vertices that have triangles."""
+        """(v, c) the diffused loads (k, c), at the vertices that have triangles."""
         result = np.empty((len(loads), loads.shape[1]))
         result[self._order] = self._factored.solve(loads[self._order])
         return np.asarray(result[self._vertices])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A base and the keys that were made on it: checked, seams closed, in units in which the surface is solved."""
+"""The keys of one base shape: validated, with closed seams, in the units in which the surface is solved."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from ..triangles.topology import sides, unique_edges, vertex_components
 
 
 class KeysOnBase:
-    """Two keys or more of one base.
+    """Two or more keys of one base shape.
 
     Parameters
     ----------
     base : (n, 3)
         The shape that all keys are relative to.
     keys : sequence of (n, 3)
-        At least two.
-    faces : (m, 3)
+        At least two keys.
+    faces : (m, 3) int64
         Triangles.
-    edges : (e, 2), optional
-        Edges to keep together that belong to no triangle.
+    edges : (e, 2) int64, optional
+        Edges that belong to no triangle and keep their length.
 
     Raises
     ------
@@ -41,11 +41,11 @@ class KeysOnBase:
     pairs : list of KeyPair
         The base with each key.
     vertices : (k,) int64
-        One of each group of vertices that coincide in all keys; ``faces`` and ``edges`` count in these.
+        One vertex of each group that coincides in all keys; ``faces`` and ``edges`` use indices into these.
     group : (n,) int64
         The group of every vertex.
     still : (n,) bool
-        Vertices that every key leaves in place.
+        Whether all keys leave a vertex in place.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class KeysOnBase:
             require_sizes(pair)
         first = self.pairs[0]
         self.base, self.diagonal = first.key0, first.diagonal
-        # What coincides in every pair; a vertex's group has the lowest number of those in it.
+        # Vertices are grouped if they coincide in every pair.
         groups = np.stack([pair.welding[1] for pair in self.pairs], axis=1)
         _, vertices, group = np.unique(groups, axis=0, return_index=True, return_inverse=True)
         order = np.argsort(vertices)
@@ -75,14 +75,14 @@ class KeysOnBase:
         self._origin = 0.5 * (self.base.min(axis=0) + self.base.max(axis=0))
 
     def scaled(self, shape: Floats) -> Floats:
-        """(k, 3) positions (n, 3) of the vertices that stand for all, the base's diagonal as unit."""
+        """(k, 3) positions of the representative ``vertices`` of a shape (n, 3), in units of the base's diagonal."""
         return np.asarray((shape[self.vertices] - self._origin) * self._scale)
 
     def whole(self, positions: Floats, shapes: Sequence[Floats]) -> Floats:
-        """(n, 3) positions of all vertices from ``scaled`` ones (k, 3).
+        """(n, 3) positions of all vertices, given ``scaled`` ones (k, 3): the inverse of ``scaled``.
 
-        What every key leaves in place is there exactly. Copies of a vertex that rounding has moved apart are as far
-        apart as the ``shapes`` (n, 3) have them together.
+        Still vertices are placed exactly. Coincident vertices that rounding has separated keep the offsets that the sum
+        of the ``shapes`` (n, 3) gives them.
         """
         found = (positions * (1.0 / self._scale) + self._origin)[self.group]
         added = sum((shape - self.base for shape in shapes), start=self.base)
@@ -93,5 +93,5 @@ class KeysOnBase:
 
     @cached_property
     def labels(self) -> Ints:
-        """(k,) connected component of each of the ``vertices``."""
+        """(k,) connected component of each of the representative ``vertices``."""
         return vertex_components(np.concatenate([unique_edges(sides(self.faces)), self.edges]), len(self.vertices))

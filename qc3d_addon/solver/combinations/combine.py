@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several keys on at once, each at its weight: what each shows by itself, composed, and kept from crossing itself."""
+"""Combines several keys, each at its weight, into one shape, and resolves its self-crossings."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from .joint_crossings import JointCrossings
 from .order import outermost_first
 
 _UNCROSSING_ATTEMPTS = 3
-# How many times as strongly crossing places are drawn to what is carried along, so that the smallest triangles give
-# way; and to the map of the volume, which is coarser than they are.
+# Factors on the anchor weights at crossings: for the carried shape, so large that the smallest triangles give way; for
+# the map of the volume, which is coarser than they are, less.
 _STRONGEST_CARRIED, _STRONGEST_MAP = 1e12, 1e8
 
 
 @dataclass(frozen=True, eq=False)
 class Combination:
-    """Several keys on at once.
+    """The combination of several keys.
 
     Parameters
     ----------
     shape : (n, 3)
-        In the keys' own coordinates.
+        The combined shape, in the keys' own coordinates.
     order : tuple of int
-        Numbers of the keys, the outermost first.
+        Indices of the keys, outermost first.
     crossings : int or None
-        Pairs of triangles that cross in the shape beyond those that cross in the base or a key; None where so many
-        triangles lie over each other that the search is given up.
+        Number of pairs of triangles that cross in the shape, but neither in the base nor in a key; None if so many
+        triangles overlap that the search was given up.
     notes : tuple of str
         Sentences for the user.
     """
@@ -60,26 +60,26 @@ def combine(
     order: Sequence[int] | None = None,
     options: FitOptions | None = None,
 ) -> Steps[Combination]:
-    """The shape of several keys together, each at its weight.
+    """Combine several keys, each at its weight.
 
     Parameters
     ----------
     keys : KeysOnBase
     weights : sequence of float, optional
-        How much each key is on, 0..1; all fully where none are given. What a key shows where it is partly on is its
-        in-between of mode ``natural``, for which a map is fitted.
+        Weight of each key, 0..1; all 1 by default. A key with a weight between shows its natural in-between, for which
+        a map is fitted.
     order : sequence of int, optional
-        Numbers of the keys, the outermost first; found by what they turn and bend where it is not given.
+        Indices of the keys, outermost first; by default found from what they turn and bend.
     options : FitOptions, optional
-        Of the fits.
+        Options of the fits.
 
     Raises
     ------
     InputError
-        If there are not as many weights as keys, one is outside 0..1, the order is none of the keys, or memory would
-        not be enough.
+        If the number of weights is wrong, a weight is outside 0..1, the order is not a permutation of the keys, or
+        memory would not be enough.
     MeshingError
-        If the volume of a key that is partly on cannot be filled.
+        If the volume of a key with a weight between 0 and 1 cannot be filled.
     """
     chosen = FitOptions() if options is None else options
     values = _checked_weights(weights, len(keys.pairs))
@@ -107,10 +107,10 @@ def combine(
 
 
 def _uncrossed(keys: KeysOnBase, on: Sequence[Floats], options: FitOptions) -> Steps[tuple[Floats, int | None]]:
-    """The shape of ``on`` together, (n, 3), and its crossings beyond theirs.
+    """The combined shape (n, 3) of the shapes ``on``, and its number of crossings beyond theirs.
 
-    Where it crosses itself, it is drawn to what the outer shapes carry along; and where that does not help, to the map
-    of the volume around the base that comes nearest to it, which lets nothing cross that does not cross in the base.
+    Where it crosses itself, it is drawn to what the outer shapes carry along. If that does not help, it is drawn to the
+    image of the base under the closest fold-free map of the volume: this crosses itself only where the base does.
     """
     composer = Composer(keys)
     best = composer.composed(on)
@@ -138,7 +138,7 @@ def _uncrossed(keys: KeysOnBase, on: Sequence[Floats], options: FitOptions) -> S
 
 
 def _unfolded(keys: KeysOnBase, shape: Floats, options: FitOptions) -> Steps[Floats | None]:
-    """(n, 3) the base carried near a shape (n, 3) by a map without folds; None where none leads there."""
+    """(n, 3) the base carried close to a shape (n, 3) by a map without folds; None if none could be fitted."""
     first = keys.pairs[0]
     try:
         fitted = yield from fit_pair(KeyPair(keys.base, shape, first.faces, first.edges, first.polygons), options)
@@ -148,7 +148,7 @@ def _unfolded(keys: KeysOnBase, shape: Floats, options: FitOptions) -> Steps[Flo
 
 
 def _sharing(fits: int, number: int, step: Progress) -> Progress:
-    """A step of one of the pieces of work after so many fits, as a step of making frames."""
+    """A step of piece ``number`` of the work after ``fits`` fits, as progress of the stage of the frames."""
     return Progress("frames", (number + step.overall) / (fits + 1), fits, fits)
 
 

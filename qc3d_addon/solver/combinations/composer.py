@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of several keys on at once: rotations one inside the other, stretches added, solved for positions.
+"""Composition of keys: rotations are multiplied, stretches added, and positions solved for.
 
-A triangle that one key turns by R_A and stretches by P_A, and another one by R_B and P_B, is to be turned by R_A R_B
-and stretched by P_A + P_B - I: the second key's motion happens inside the first one's. That is how joints of a chain
-add up, where the sum of the two shapes takes the second motion in the place where it would be without the first.
+If one key turns a triangle by R_A and stretches it by P_A, and another by R_B and P_B, both together turn it by R_A R_B
+and stretch it by P_A + P_B - I: the second motion happens inside the first one, as with the joints of a limb. The sum
+of the two shapes would instead let the second motion happen where it would be without the first.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from ..triangles.geometry import vertex_areas
 from .averages import Averages
 from .base import KeysOnBase
 
-# Two keys that each squash by more than half must not turn anything inside out together. What one after the other would
-# leave is more than their sum wherever both shrink, so only half of that is a limit.
+# Two keys that each squash by more than half must not turn anything inside out together. Where both shrink, the product
+# of their stretches is larger than the sum, so that only half of the product is a lower limit.
 _LEAST_OF_PRODUCT = 0.5
 
 
 class Composer:
-    """Makes shapes of several keys on at once; what does not depend on their weights is factored once.
+    """Composes shapes of several keys. Everything that does not depend on their weights is factored once.
 
     Parameters
     ----------
@@ -55,22 +55,22 @@ class Composer:
         places: Bools | None = None,
         strength: float = 1.0,
     ) -> Floats:
-        """The shape of all of ``shapes`` together.
+        """The composition of all ``shapes``.
 
         Parameters
         ----------
         shapes : sequence of (n, 3)
-            What each key shows by itself, the outermost first: the keys themselves, or in-betweens where they are
-            partly on.
+            The shape of each key alone, outermost first: the key itself, or an in-between if its weight is below 1.
         anchor : (n, 3), optional
-            What vertices are drawn to; where it is not given, what ``carried`` makes of the shapes.
+            Anchors of the vertices; by default the ``carried`` shapes.
         places : (k,) bool, optional
-            Vertices that are drawn to their anchors this many times as strongly as the others.
+            Vertices whose anchor weights are multiplied by ``strength``.
         strength : float
 
         Returns
         -------
-        (n, 3), in the keys' own units.
+        (n, 3)
+            Positions in the keys' own units.
         """
         keys = self._keys
         scaled = [keys.scaled(shape) for shape in shapes]
@@ -97,11 +97,11 @@ class Composer:
         return keys.whole(Sweeps(surface, [wanted]).settled(SWEEPS)[0], shapes)
 
     def carried(self, shapes: Sequence[Floats]) -> Floats:
-        """(n, 3) every vertex where the outer of ``shapes`` (n, 3) have it, moved on by the inner ones.
+        """(n, 3) the outermost shape plus the displacements of the inner ``shapes`` (n, 3), carried along by it.
 
-        What an inner shape adds is turned as the outer one turns the region around: nothing small is turned against
-        what is beside it, so nothing new crosses where turns differ from triangle to triangle, as at the corners of a
-        mouth; but lengths are kept only where the outer shape turns a whole region alike.
+        The displacement of an inner shape is turned by the mean rotation of the outer shape in the region around. So
+        neighbors are never turned against each other, and nothing new crosses where rotations differ from triangle to
+        triangle, as at the corners of a mouth. But lengths are kept only where a whole region turns alike.
         """
         scaled = [self._keys.scaled(shape) for shape in shapes]
         system = self._system(self._usable(scaled))
@@ -109,7 +109,7 @@ class Composer:
         return self._keys.whole(system.carried(self._base, scaled, turned), shapes)
 
     def _usable(self, scaled: Sequence[Floats]) -> Ints:
-        """(u, 3) the triangles that have an area in all shapes."""
+        """(u, 3) the usable triangles: those that have an area in all shapes."""
         faces = self._keys.faces
         count = np.zeros(len(faces), dtype=np.int64)
         for shape in scaled:
@@ -117,7 +117,7 @@ class Composer:
         return np.asarray(faces[count == len(scaled)])
 
     def _system(self, faces: Ints) -> _System:
-        """What is factored for usable triangles; that of the last ones is kept."""
+        """The factored system for the usable triangles; the latest one is cached."""
         if self._built is None or not np.array_equal(self._built.faces, faces):
             deformation = TriangleDeformation.between(self._base, self._base, faces)
             springs = edges_without_triangle(self._keys.faces, self._keys.edges, deformation.faces)
@@ -135,7 +135,7 @@ class Composer:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """What does not depend on how the usable triangles ``faces`` (u, 3) turn and stretch."""
+    """Everything that does not depend on how the usable triangles ``faces`` (u, 3) turn and stretch."""
 
     faces: Ints
     springs: Ints
@@ -150,12 +150,12 @@ class _System:
         return np.asarray(base + offsets)
 
     def stronger(self, places: Bools, strength: float) -> Floats:
-        """(k,) by how much anchors are stronger at the places and, fading, around them."""
+        """(k,) factors on the anchor weights: ``strength`` at the places, fading to 1 around them."""
         return np.asarray(strength ** self.averages.faded(places))
 
 
 def _stretches(turned: Sequence[TriangleDeformation]) -> Floats:
-    """(m, 2, 2) the stretches of all added up, and never flatter than half of what one after the other would leave."""
+    """(m, 2, 2) the sum of all stretches, with eigenvalues of at least half of the product of the smallest ones."""
     parts = [deformation.stretch for deformation in turned]
     total = sum((part.at(1.0, "linear") - np.eye(2) for part in parts), start=np.eye(2))
     values, vectors = np.linalg.eigh(total)
@@ -165,13 +165,13 @@ def _stretches(turned: Sequence[TriangleDeformation]) -> Floats:
 
 
 def _lengths(base: Floats, scaled: Sequence[Floats], edges: Ints) -> Floats:
-    """(e,) how long edges should be."""
+    """(e,) wanted lengths of the edges."""
     lengths = [np.linalg.norm(shape[edges[:, 1]] - shape[edges[:, 0]], axis=1) for shape in (base, *scaled)]
     return _added_ratios(lengths[0], lengths[1:])
 
 
 def _added_ratios(base: Floats, values: Sequence[Floats]) -> Floats:
-    """Volumes or lengths with what each key adds to the base's, and never less than half of their product."""
+    """The base's volumes or lengths plus each key's relative changes, but at least half of the product of ratios."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = [np.where(base != 0.0, value / base, 1.0) for value in values]
     together = 1.0 + sum((ratio - 1.0 for ratio in ratios), start=np.zeros_like(base))

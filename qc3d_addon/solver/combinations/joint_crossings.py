@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What crosses where several keys are on at once, and in none of them."""
+"""Crossings that occur when several keys are on at once, but in none of them alone."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from ..collision.crossings import CrossingSearch
 
 
 class JointCrossings:
-    """Crossings of a surface that some of several shapes make together.
+    """Finds the new crossings of a surface in combinations of several shapes.
 
-    What crosses in the base or in one of the shapes may cross in all together, and so may what touches it: where a
-    shape has folded the surface into itself, the crossing moves on by a triangle as another shape turns it.
+    Triangles that cross in the base or in one of the shapes may also cross in the combination, and so may their
+    neighbors: where one shape folds the surface into itself, another one can shift the crossing by a triangle.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        Triangles.
     base : (n, 3)
+        The base shape.
     shapes : sequence of (n, 3)
-        Of which some are on at once.
+        The shapes that are combined.
     still : (n,) bool
-        Vertices that are where the base has them in all shapes.
+        Vertices that have their place of the base in all shapes.
     """
 
     def __init__(self, faces: Ints, base: Floats, shapes: Sequence[Floats], still: Bools) -> None:
@@ -35,15 +37,19 @@ class JointCrossings:
         self._in_base, *self._in_shapes = (self._codes(shape) for shape in (base, *shapes))
 
     def fresh(self, shape: Floats, on: Sequence[int] | None = None) -> Ints | None:
-        """Pairs of triangles (k, 2) that cross in a shape (n, 3) and in none of those it is made of.
-
-        None where so many triangles lie over each other, in it or in those, that the search is given up.
+        """Pairs of triangles (k, 2) that cross in a combined shape, but in none of its parts.
 
         Parameters
         ----------
         shape : (n, 3)
+            The combined shape.
         on : sequence of int, optional
-            Numbers of the shapes that are on; all where it is not given.
+            Indices of the shapes that it combines; all by default.
+
+        Returns
+        -------
+        (k, 2) int64 or None
+            None if so many triangles overlap, in it or in its parts, that the search was given up.
         """
         parts = self._in_shapes if on is None else [self._in_shapes[number] for number in on]
         in_parts = [part for part in (self._in_base, *parts) if part is not None]
@@ -58,7 +64,7 @@ class JointCrossings:
         return np.asarray(found[~near])
 
     def _codes(self, shape: Floats) -> Ints | None:
-        """One number for each pair of triangles that cross; None where the search is given up."""
+        """One code for each crossing pair of triangles; None if the search was given up."""
         try:
             pairs = self._search.pairs(shape)
         except CrowdedError:

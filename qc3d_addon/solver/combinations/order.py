@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which of several keys is the outer one: it carries along the places where the others bend."""
+"""The order of keys in a combination: the outer key carries along the places where the others bend."""
 
 from __future__ import annotations
 
@@ -14,18 +14,16 @@ from ..triangles.geometry import areas
 from ..triangles.topology import face_adjacency
 from .base import KeysOnBase
 
-# Of the farthest travel of a key: what moves less is not what the key is about.
-_MOVES = 0.01
-# Of each other: two keys that turn each other's bends this much alike carry each other.
-_TIE = 0.02
+_MOVES = 0.01  # of a key's largest displacement; triangles that move less do not count as moved by the key
+_TIE = 0.02  # relative; if two keys turn each other's bends this much alike, the order is open
 
 
 def outermost_first(keys: KeysOnBase) -> tuple[int, ...]:
-    """Numbers of the keys, the outermost first.
+    """Indices of the keys, outermost first.
 
-    An arm that is raised carries its elbow along, and bending the elbow leaves the shoulder as it is: the outer of two
-    keys is the one that turns more where the other bends. Where that leaves it open, the one that moves more of the
-    surface; then the one that is named first.
+    Raising an arm carries its elbow along, but bending the elbow leaves the shoulder as it is. So the outer of two keys
+    is the one that turns more where the other bends; if that is open, the one that moves more of the surface; and if
+    that is open too, the first one.
     """
     bends = [Bend(keys, number) for number in range(len(keys.pairs))]
     points = [sum(carries(one, other) for other in bends if other is not one) for one in bends]
@@ -33,22 +31,24 @@ def outermost_first(keys: KeysOnBase) -> tuple[int, ...]:
 
 
 class Bend:
-    """How a key turns triangles, how much it bends the surface around each, and how much of it the key moves.
+    """How a key turns triangles, how much it bends the surface around them, and how much of the surface it moves.
 
     Parameters
     ----------
     keys : KeysOnBase
     number : int
-        Of the key.
+        Index of the key.
 
     Attributes
     ----------
     turns : (m, 3)
         Rotation vectors of the triangles, radians.
-    angles, bent : (m,)
-        How far each triangle turns, and how far its neighbors turn beside it, radians times the root of its area.
+    angles : (m,)
+        Angle by which each triangle turns, radians.
+    bent : (m,)
+        Sum of the angles between each triangle and its neighbors, radians, times the square root of its area.
     moved : float
-        Area of what moves.
+        Area that the key moves.
     """
 
     def __init__(self, keys: KeysOnBase, number: int) -> None:
@@ -69,6 +69,6 @@ class Bend:
 
 
 def carries(one: Bend, other: Bend) -> float:
-    """1 where the first key carries the other, 0 where the other carries it, and a half where that is open."""
+    """1 if the first key carries the other, 0 if the other carries the first, 1/2 if that is open."""
     outward, inward = float(one.angles @ other.bent), float(other.angles @ one.bent)
     return 0.5 if np.isclose(outward, inward, rtol=_TIE, atol=0.0) else float(outward > inward)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which pairs of keys add up rightly, and which need a combination: told from the keys alone, without solving."""
+"""Verdicts on pairs of keys: for which adding is right, and which need a combination; found without solving."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ from .base import KeysOnBase
 from .joint_crossings import JointCrossings
 from .order import Bend, carries
 
-# What is seen: of the base's diagonal, of edges' lengths, of a volume.
+# Smallest visible differences, relative to the base's diagonal, to the lengths of edges, and to a volume.
 _SEEN_DISTANCE, _SEEN_LENGTHS, _SEEN_VOLUME = 0.003, 0.02, 0.005
-# Edges and volumes below this part of the size have nothing to speak of.
+# Shorter edges, relative to the diagonal, and smaller volumes, relative to its cube, are not measured.
 _SHORTEST, _SMALLEST = 1e-6, 1e-9
-# Of the edges that both keys move, as many are worse as nobody sees.
-_PERCENTILE = 99.0
+_PERCENTILE = 99.0  # of the edges that both keys move; a few worse ones are not seen
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the sum of two keys is right.
+    """Verdict on whether the sum of two keys is right.
 
     Parameters
     ----------
     first, second : int
-        Numbers of the keys.
+        Indices of the keys.
     outer : int
-        The one of them that carries the other along.
+        The key, of these two, that carries the other one along.
     distance : float
-        About how far the sum is off at most, over the base's diagonal: by how much what the inner key adds has to be
-        turned.
+        Estimated largest error of the sum, over the base's diagonal: how far the outer key's rotation moves the
+        displacements of the inner key.
     lengths : float
-        By how much the sum changes lengths that neither key changes so, over the base's; 99th percentile of the edges
-        that both keys move.
+        How far edge lengths in the sum are from what the keys' own changes add up to, over the base's lengths; 99th
+        percentile of the edges that both keys move.
     volume : float
-        By how much the sum leaves the volume of a closed part, over that of the base, beyond what the keys change.
+        How far the volume of a closed component is from what the keys' own changes add up to, over the base's volume;
+        the worst component.
     crossings : int or None
-        Pairs of triangles that cross in the sum, and in none of the keys; None where the search is given up.
+        Number of pairs of triangles that cross in the sum but in neither key; None if the search was given up.
     """
 
     first: int
@@ -61,13 +61,13 @@ class Verdict:
 
     @property
     def adding_is_right(self) -> bool:
-        """Whether nobody sees a difference."""
+        """Whether the differences are too small to be seen."""
         seen = self.distance > _SEEN_DISTANCE and self.lengths > _SEEN_LENGTHS
         return not (seen or self.volume > _SEEN_VOLUME or self.crossings)
 
     @property
     def text(self) -> str:
-        """The verdict in words."""
+        """The verdict in words, for the user."""
         if self.adding_is_right:
             return "adding is right"
         crossings = f", {self.crossings} crossings" if self.crossings else ""
@@ -77,14 +77,14 @@ class Verdict:
 
 
 def verdicts(keys: KeysOnBase, chosen: Sequence[tuple[int, int]] | None = None) -> Iterator[Verdict]:
-    """The verdict for every two keys, or for the ``chosen`` pairs of their numbers, one after the other."""
+    """Yield the verdict on each pair of keys, or on each of the ``chosen`` pairs of indices."""
     judge = _Judge(keys)
     for first, second in combinations(range(len(keys.pairs)), 2) if chosen is None else chosen:
         yield judge.of(first, second)
 
 
 class _Judge:
-    """What all pairs share, computed once."""
+    """Everything that the verdicts share, computed once."""
 
     def __init__(self, keys: KeysOnBase) -> None:
         self._keys = keys
@@ -122,14 +122,14 @@ class _Judge:
         return points > 0.5 or (points == 0.5 and one.moved >= other.moved)
 
     def _turned(self, outer: int, inner: int) -> float:
-        """How far what the inner key adds moves where the outer one turns it, at the vertex where that is most."""
+        """Largest distance by which the outer key's rotation moves the inner key's displacements."""
         both = np.flatnonzero(self._moves[outer] & self._moves[inner])
         offsets = (self._shapes[inner] - self._base)[both]
         turned = np.einsum("nij,nj->ni", self._around[outer][both], offsets)
         return float(np.linalg.norm(turned - offsets, axis=1).max())
 
     def _means(self, bend: Bend, sizes: Floats) -> NDArray[np.float32]:
-        """(k, 3, 3) means of the rotations of the triangles around each vertex; the identity where there are none."""
+        """(k, 3, 3) mean rotation of the triangles around each vertex; the identity if there are none."""
         corners, count = self._keys.faces.ravel(), len(self._base)
         turns = np.repeat(sizes[:, None] * (rotation_matrices(bend.turns) - np.eye(3)).reshape(-1, 9), 3, axis=0)
         total = np.maximum(sums_by_label(corners, np.repeat(sizes, 3), count), 1e-300)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Polygons of a triangulated mesh: which triangles belong together, and triangles that favor none of its diagonals."""
+"""Polygons of triangulated meshes: which triangles form one, and coverings that do not depend on the diagonals."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ from ..arrays import Bools, Floats, Ints
 from .geometry import face_normals
 from .topology import among, distinct
 
-# Sine of the angle between two triangles that are one flat face: far above rounding in single precision.
-_FLAT = 1e-5
-# Of its square: a side that is longer than another by less is as long.
-_LONGER = 1e-6
-# Of a polygon of more corners only evenly spaced ones have a fan: a disc of a thousand would have a million triangles.
+_FLAT = 1e-5  # sine of the largest angle between the triangles of a flat face: far above rounding in single precision
+_LONGER = 1e-6  # relative; squared lengths that differ by less are equal
+# A polygon has fans from at most this many corners, evenly spaced: a disk with a thousand corners would otherwise need
+# a million triangles.
 _MOST_FANS = 16
 
 
 def covering(faces: Ints, polygons: Ints) -> tuple[Ints, Floats]:
     """Triangles that cover each polygon evenly, whatever diagonals it was triangulated along.
 
-    The mean of the fans from all its corners: of a quad both diagonals, each triangle counting half. So what is turned,
-    or mirrored, or begun at another corner, is covered in the same way. Of very many corners only some have a fan.
+    The covering is the mean of the fans from all corners: for a quad, both diagonals, with half the weight for each
+    triangle. So it does not depend on the first corner, and a rotated or mirrored polygon has the rotated or mirrored
+    covering. Polygons with many corners have fans from some of them only.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        Triangles.
     polygons : (m,) int64
-        The polygon of each triangle; triangles of one number that are no polygon stay as they are.
+        Label of the polygon of each triangle. Triangles with a common label that do not form one polygon stay as they
+        are.
 
     Returns
     -------
     triangles : (k, 3) int64
-        Turning the same way as those of the polygon.
+        Oriented like the triangles of the polygon.
     shares : (k,)
-        What each counts, 1 for a triangle by itself; those of a polygon of c corners sum to c - 2.
+        Weight of each triangle: 1 for a single one; those of a polygon with c corners sum to c - 2.
     """
     label = np.unique(polygons, return_inverse=True)[1].ravel()
     single = (np.bincount(label, minlength=1) == 1)[label]
@@ -52,7 +54,7 @@ def covering(faces: Ints, polygons: Ints) -> tuple[Ints, Floats]:
 
 
 def _fans(count: int) -> Ints:
-    """(f, 3) places of the corners of the fans of a polygon: those of a quad are each there once, not twice."""
+    """(f, 3) corners of the fans' triangles in a polygon with ``count`` corners; each of a quad's is listed once."""
     apexes = np.arange(0, count, -(-count // _MOST_FANS))
     steps = np.arange(1, count - 1)
     fans = np.stack(np.broadcast_arrays(apexes[:, None], apexes[:, None] + steps, apexes[:, None] + steps + 1), axis=2)
@@ -61,15 +63,15 @@ def _fans(count: int) -> Ints:
 
 
 def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
-    """The corners of polygons one after the other, where each begins, and how many it has.
+    """The corners of all polygons in order, where each polygon starts, and its number of corners.
 
-    Beside that, which triangles belong to none, because those of their number do not make one loop without a hole.
+    Also, which triangles belong to no polygon, because the triangles with their label are not bounded by one loop.
     """
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     owner = np.tile(label, 3)
     span = int(faces.max(initial=0)) + 1
     tail, head = owner * span + directed[:, 0], owner * span + directed[:, 1]
-    # Sides of the polygons: those whose other direction is no side of a triangle of theirs.
+    # The polygons' sides are those whose reverse does not belong to a triangle of the same polygon.
     number = np.unique(np.concatenate([tail, head]), return_inverse=True)[1].ravel()
     ends = number[: len(tail)] * (len(number) + 1) + number[len(tail) :]
     back = number[len(tail) :] * (len(number) + 1) + number[: len(tail)]
@@ -84,7 +86,7 @@ def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
     leads_on = (tail[following] == head) & (np.bincount(following, minlength=len(tail)) == 1)
     sound = np.bincount(owner, weights=leads_on, minlength=polygons) == sides
     sound &= (sides == triangles + 2) & (triangles > 0)
-    # How far each side is from the first of its polygon, by doubling.
+    # The distance from each side to the first side of its polygon, by pointer doubling.
     inside = sound[owner]
     root = np.zeros(len(tail), dtype=bool)
     root[first[sound]] = True
@@ -92,7 +94,7 @@ def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
     left = (jump != np.arange(len(tail))).astype(np.int64)
     for _ in range(int(sides.max(initial=1)).bit_length()):
         left, jump = left + left[jump], jump[jump]
-    # A loop that leaves sides out has not come back to its first side from all of them.
+    # If there are several loops, some sides never lead back to the first one.
     sound &= np.bincount(owner, weights=left, minlength=polygons) == sides * (sides - 1) // 2
     inside = sound[owner]
     order = np.lexsort((-left[inside], owner[inside]))
@@ -101,15 +103,16 @@ def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
 
 
 def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
-    """(m,) the polygon of each triangle where that was not told: two that make a flat quad in all keys are one.
+    """(m,) guessed polygon of each triangle: two triangles that form a flat convex quad in all keys are one polygon.
 
-    The quad is convex, and the side between its triangles is, in all keys together, the longest of those across which
-    either could be joined.
+    If a triangle could be joined across several sides, the one that is longest in all keys together is chosen.
 
     Parameters
     ----------
     keys : list of (n, 3)
+        Positions in each key.
     faces : (m, 3) int64
+        Triangles.
     """
     polygons = np.arange(len(faces))
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -117,7 +120,7 @@ def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
     order = np.lexsort((low > sides[:, 0], high, low))
     codes = (low * (int(faces.max(initial=0)) + 1) + high)[order]
     alike = codes[1:] == codes[:-1]
-    # Two triangles of opposite directions, and no third.
+    # The side has exactly two triangles, with opposite directions.
     inner = alike & ~np.append(alike[1:], False) & ~np.append(False, alike[:-1])
     first, second = order[:-1][inner], order[1:][inner]
     forward = sides[first, 0] == sides[second, 1]
@@ -144,13 +147,13 @@ def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
 
 
 def _third(faces: Ints, sides: Ints) -> Ints:
-    """The corners that face sides, numbered as three rows of all triangles."""
+    """The corners opposite to sides, where side k m + j is side k of triangle j."""
     triangle, which = sides % len(faces), sides // len(faces)
     return np.asarray(faces[triangle, (which + 2) % 3])
 
 
 def _flat_and_convex(key: Floats, quads: Ints) -> Bools:
-    """Whether the quads (q, 4) lie in a plane and turn the same way at all four corners."""
+    """(q,) whether quads (q, 4) are planar and turn the same way at all four corners."""
     normals = np.stack([face_normals(key, np.roll(quads, -turn, axis=1)[:, :3]) for turn in range(4)])
     sizes = np.linalg.norm(normals, axis=2)
     along = normals.sum(axis=0)

@@ -118,7 +118,7 @@ def unique_edges(edges: Ints) -> Ints:
 
 
 def open_loops(faces: Ints) -> tuple[Ints, Ints]:
-    """The vertices (k,) at edges that have one triangle, and for each the number of the loop that these edges make."""
+    """The vertices (k,) of boundary edges, which have one triangle, and for each the label of its boundary loop."""
     edges = sides(faces)
     low, high = edges.T
     span = int(high.max(initial=0)) + 1

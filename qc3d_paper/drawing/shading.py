@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ VIEWS = {"front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0), "three-quarter": (0
 # from the right.
 _LIGHTS = (((-0.5, 0.65, 0.6), 0.75), ((0.8, 0.1, 0.5), 0.22))
 _AMBIENT = 0.2
+_MOST_PIXELS = 100_000  # around triangles that are drawn at once
+_BAND = 32  # rows of the picture that are drawn at once
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,13 @@ class Camera:
         low, high = flat.min(axis=0), flat.max(axis=0)
         border = margin * np.max(high - low)
         return cls(axes, low - border, high + border)
+
+
+def upright(points: Floats, up: str) -> Floats:
+    """Points (..., 3) turned so that the axis ``up`` of x, y and z points along z, as pictures have it."""
+    if up == "y":
+        return np.asarray(points[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0]))
+    return np.asarray(points[..., [1, 2, 0]]) if up == "x" else points
 
 
 def best_view(key0: Floats, key1: Floats) -> str:
@@ -92,25 +103,33 @@ def draw(
     spots = (seen[:, :2] - camera.low) * scale
     normals = _vertex_normals(points, faces) @ camera.axes.T
 
-    triangle, rows, columns, weights = _covered(spots, faces, fine, width)
-    corners = faces[triangle]
-    depth = np.einsum("pk,pk->p", weights, seen[corners, 2])
-    # The last write to a pixel stays, so the nearest triangle is written last.
-    order = np.argsort(depth, kind="stable")
-    nearest = np.full(fine * width, -1, dtype=np.int64)
-    nearest[rows[order] * width + columns[order]] = order
-    drawn = nearest >= 0
-    chosen = nearest[drawn]
+    paint = np.broadcast_to(np.array(colour), (len(faces), 3))
+    bands = []
+    for low in range(0, height, _BAND):
+        high = min(low + _BAND, height)
+        # Only what may reach into the band; the rest of the triangles costs nothing there.
+        inside = (spots[faces, 1].max(axis=1) >= low * samples) & (spots[faces, 1].min(axis=1) <= high * samples)
+        nearest = _nearest(
+            spots - [0.0, low * samples], seen[:, 2], faces[inside], (high - low) * samples, width
+        )
+        band = _shaded(nearest, faces[inside], normals, paint[inside], background)
+        bands.append(band.reshape(high - low, samples, width // samples, samples, 3).mean(axis=(1, 3)))
+    return np.asarray(np.concatenate(bands)[::-1])
 
-    normal = np.einsum("pk,pka->pa", weights[chosen], normals[corners[chosen]])
+
+def _shaded(
+    nearest: _Nearest, faces: Ints, normals: Floats, paint: Floats, background: tuple[float, float, float]
+) -> Floats:
+    """(pixels, 3) the light that comes from what is nearest."""
+    drawn = nearest.triangle >= 0
+    triangle, weights = nearest.triangle[drawn], nearest.weights[drawn]
+    normal = np.einsum("pk,pka->pa", weights, normals[faces[triangle]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     front = normal[:, 2] >= 0.0
     light = _brightness(np.where(front[:, None], normal, -normal)) * np.where(front, 1.0, 0.6)
-    picture = np.broadcast_to(np.array(background), (fine * width, 3)).copy()
-    paint = np.array(colour)
-    picture[drawn] = np.clip(light[:, None] * (paint if paint.ndim == 1 else paint[triangle[chosen]]), 0.0, 1.0)
-    picture = picture.reshape(fine // samples, samples, width // samples, samples, 3).mean(axis=(1, 3))
-    return np.asarray(picture[::-1])
+    picture = np.tile(background, (len(drawn), 1))
+    picture[drawn] = np.clip(light[:, None] * paint[triangle], 0.0, 1.0)
+    return picture
 
 
 def _axes(towards: Floats) -> Floats:
@@ -128,6 +147,32 @@ def _vertex_normals(points: Floats, faces: Ints) -> Floats:
         [np.bincount(faces.ravel(), weights=np.repeat(area[:, axis], 3), minlength=len(points)) for axis in range(3)],
         axis=1,
     )
+
+
+class _Nearest(NamedTuple):
+    """Of each pixel the triangle in front, -1 for none, and the weights of its corners."""
+
+    triangle: Ints
+    weights: Floats
+
+
+def _nearest(spots: Floats, depths: Floats, faces: Ints, height: int, width: int) -> _Nearest:
+    """What is seen in each pixel, row by row: of a few triangles at a time, so that memory does not grow with them."""
+    found = _Nearest(np.full(height * width, -1, dtype=np.int64), np.zeros((height * width, 3)))
+    front = np.full(height * width, -np.inf)
+    spans = np.ptp(spots[faces], axis=1) + 1.0
+    share = np.cumsum(spans.prod(axis=1)) // _MOST_PIXELS
+    for first, last in pairwise([0, *(np.flatnonzero(np.diff(share)) + 1), len(faces)]):
+        triangle, rows, columns, weights = _covered(spots, faces[first:last], height, width)
+        triangle += first
+        depth = np.einsum("pk,pk->p", weights, depths[faces[triangle]])
+        pixel = rows * width + columns
+        # The last write to a pixel stays, so the nearest goes last.
+        order = np.argsort(depth, kind="stable")
+        order = order[depth[order] >= front[pixel[order]]]
+        front[pixel[order]], found.triangle[pixel[order]] = depth[order], triangle[order]
+        found.weights[pixel[order]] = weights[order]
+    return found
 
 
 def _covered(spots: Floats, faces: Ints, height: int, width: int) -> tuple[Ints, Ints, Ints, Floats]:

@@ -18,9 +18,11 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter
 
 _AXES = "xyz"
 _HISTOGRAM_BINS = 80
+_NARROW, _WIDE = 3.0, 30.0  # the largest value over the smallest: below there are even ticks, above powers of ten
 # Edges that a plane crosses, by sorted corner: from the single corner on one side to the three others, or from the two
 # corners on one side to the two on the other.
 _ONE = np.array([[0, 1], [0, 2], [0, 3], [0, 3]])
@@ -117,8 +119,13 @@ def save_histograms(analysis: Analysis, path: Path) -> None:
         for label, values in curves.items():
             axes.hist(values[known[label]], bins, weights=share[known[label]], histtype="step", label=label)
         axes.set_xscale("log")
-        axes.set_yscale("log")
         axes.set_ylim(1e-4, 200.0)
+        axes.set_yscale("log")
+        axes.set_xlim(bins[0], bins[-1])
+        # A logarithmic axis of few decades would have a label at every minor tick.
+        axes.xaxis.set_major_locator(_ticks(bins[-1] / bins[0]))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(title)
         axes.axvline(1.0, color="0.7", linewidth=0.8, zorder=0)
         if len(curves) > 1:
@@ -126,3 +133,10 @@ def save_histograms(analysis: Analysis, path: Path) -> None:
     panels[0].set_ylabel("% of the volume")
     figure.savefig(path, dpi=110)
     pyplot.close(figure)
+
+
+def _ticks(ratio: float) -> Locator:
+    """Where a logarithmic axis has labels."""
+    if ratio < _NARROW:
+        return MaxNLocator(4)
+    return LogLocator(subs=(1.0, 2.0, 5.0)) if ratio < _WIDE else LogLocator()

@@ -12,7 +12,7 @@ import numpy as np
 
 from qc3d_addon.solver.keys.keypair import KeyPair
 
-from .shading import Camera, Floats, best_view, draw
+from .shading import Camera, Floats, best_view, draw, upright
 from .sheets import BACKGROUND, KEY_COLOUR
 
 matplotlib.use("Agg")
@@ -24,18 +24,19 @@ from matplotlib.figure import Figure
 _HEIGHT = 420  # height of a shape in pixels
 
 
-def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path) -> None:
-    """Save a picture of the first key, and of the second key painted with each of the measures (n,)."""
-    camera = Camera.around(np.stack([pair.key0, pair.key1]), best_view(pair.key0, pair.key1))
+def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path, up: str = "z") -> None:
+    """Save a picture of the first key, and of the second key painted with each of the measures (n,), ``up`` upward."""
+    first, second = upright(pair.key0, up), upright(pair.key1, up)
+    camera = Camera.around(np.stack([first, second]), best_view(first, second))
     columns = 1 + len(measures)
     figure, panels = pyplot.subplots(1, columns, figsize=(4.2 * columns, 5.4), layout="constrained")
     figure.set_facecolor(BACKGROUND)
-    panels[0].imshow(draw(pair.key0, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
+    panels[0].imshow(draw(first, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
     panels[0].set_title("first key")
     for axes, (name, values) in zip(panels[1:], measures.items(), strict=True):
         colours = scale(name, values)
         paint = np.asarray(colours.mappable.to_rgba(values[pair.faces].mean(axis=1)))[:, :3]
-        axes.imshow(draw(pair.key1, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
+        axes.imshow(draw(second, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
         axes.set_title(f"second key: {name}")
         add_colour_bar(figure, colours, axes, location="bottom", shrink=0.7)
     for axes in panels:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..errors import InputError, ReconstructionError
 from ..tets.mesh import TetMesh
 
 _COORDINATES = "xyz"
+_SAME = 1e-9  # of the map's size: what tables of ten digits leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +63,7 @@ class Conditions:
         return cls(held, np.array(values))
 
     def with_landmarks(self, vertices: ArrayLike, values: ArrayLike) -> Conditions:
-        """These conditions together with landmarks, which take precedence where both prescribe a coordinate.
+        """These conditions together with landmarks.
 
         Parameters
         ----------
@@ -76,7 +75,8 @@ class Conditions:
         Raises
         ------
         InputError
-            If an index is out of range or repeated, or if the shapes disagree.
+            If an index is out of range or repeated, a landmark contradicts a coordinate that is prescribed already, or
+            the shapes disagree.
         """
         rows, wanted = np.asarray(vertices), np.asarray(values, dtype=np.float64)
         if rows.ndim != 1 or rows.dtype.kind not in "iu" or wanted.shape != (len(rows), 3):
@@ -89,6 +89,18 @@ class Conditions:
             raise InputError("A vertex is a landmark twice; name each once.")
         held, merged = np.array(self.held), np.array(self.values)
         given = np.isfinite(wanted)
+        there = given & self.held[rows]
+        size = float(np.ptp(self.values, axis=0).max()) if there.any() else 0.0
+        apart = np.where(there, np.abs(wanted - self.values[rows]), 0.0)
+        wrong, axes = np.nonzero(apart > _SAME * size)
+        if len(wrong):
+            vertex, axis = rows[wrong[0]], axes[0]
+            raise InputError(
+                f"The landmark at vertex {vertex} wants {_COORDINATES[axis]} at {wanted[wrong[0], axis]:.6g}, where "
+                f"the boundary holds it at {self.values[vertex, axis]:.6g}; leave that coordinate out, or free the "
+                "boundary."
+            )
+        given &= ~there
         held[rows] |= given
         merged[rows] = np.where(given, wanted, merged[rows])
         return Conditions(held, merged)
@@ -102,7 +114,7 @@ class Conditions:
             If a coordinate is prescribed nowhere on a part, so that it has no unique solution, or has only a single
             prescribed value there, so that it would be constant.
         """
-        part, count = _parts(mesh)
+        part, count = mesh.parts
         for coordinate, name in enumerate(_COORDINATES):
             held = self.held[:, coordinate] & (part >= 0)
             given, owners = self.values[held, coordinate], part[held]
@@ -120,16 +132,3 @@ class Conditions:
                     f"The coordinate {name} of the map has one value wherever it is held, which makes the map flat; "
                     "hold it at two values or more."
                 )
-
-
-def _parts(mesh: TetMesh) -> tuple[Ints, int]:
-    """The connected part (N,) of each vertex, -1 for vertices without a tetrahedron, and the number of parts."""
-    count = len(mesh.points)
-    rows, columns = np.repeat(mesh.tets[:, 0], 3), mesh.tets[:, 1:].ravel()
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    _, labels = connected_components(graph, directed=False)
-    used = np.zeros(count, dtype=bool)
-    used[mesh.tets] = True
-    part = np.full(count, -1, dtype=np.int64)
-    known, part[used] = np.unique(labels[used], return_inverse=True)
-    return part, len(known)

@@ -11,8 +11,7 @@ on any mesh whose whole boundary is fixed.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import cg
+from scipy.sparse import csr_array
 
 from ..arrays import Bools, Floats
 from ..errors import ReconstructionError
@@ -22,8 +21,11 @@ from .boundary_conditions import Conditions
 from .mapping import Mapping
 from .representation import conductivity
 
-_TOLERANCE = 1e-14  # of the size of the terms in each row: about rounding
-_MOST_ITERATIONS = 20_000  # a cap for very distorted representations
+_MOST_ITERATIONS = 20_000
+# An iteration is at its end when the last ten steps and a tenth of those before move nothing by more than rounding, in
+# parts of the values' range. It is corrected until that moves little, or as little as the matrix allows.
+_STILL, _LEAST_STEPS, _PART_OF_STEPS = 1e-14, 10, 10
+_SETTLED, _MOST_CORRECTIONS = 1e-12, 10
 
 
 def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mapping:
@@ -111,19 +113,66 @@ class Reconstructor:
             held = self._held[:, coordinate]
             result[held, coordinate] = values[held, coordinate]
             free = ~(held | self._unused)
-            result[free, coordinate] = _solve(matrix, free, result[:, coordinate])
+            # In the middle of what each part is held at, no digits are spent on where the mesh lies.
+            middles, spans = self._ranges(result[:, coordinate], held & ~self._unused)
+            solution = _solve(matrix, free, result[:, coordinate] - middles, spans)
+            result[free, coordinate] = solution + middles[free]
         return result
 
+    def _ranges(self, column: Floats, held: Bools) -> tuple[Floats, Floats]:
+        """(N,) each: the middle of the values at which a vertex's part is held, and how far apart they are."""
+        part, count = self._mesh.parts
+        lowest, highest = np.full(count + 1, np.inf), np.full(count + 1, -np.inf)
+        np.minimum.at(lowest, part[held], column[held])
+        np.maximum.at(highest, part[held], column[held])
+        missing = ~(highest >= lowest)  # no part at all, or held nowhere
+        lowest[missing] = highest[missing] = 0.0
+        spans = highest - lowest
+        spans[spans == 0.0] = 1.0
+        return 0.5 * (lowest + highest)[part], spans[part]
 
-def _solve(matrix: csr_array, free: Bools, column: Floats) -> Floats:
-    """Solve for the free entries of a column by conjugate gradients with Jacobi preconditioning."""
-    inner = matrix[free][:, free]
-    # Solving for the correction keeps the tolerance meaningful if the initial guess is good.
-    residual = -(matrix @ column)[free]
-    scale = abs(matrix) @ np.abs(column)
-    floor = _TOLERANCE * float(np.linalg.norm(scale[free]))
-    preconditioner = diags_array(1.0 / inner.diagonal())
-    step, status = cg(inner, residual, rtol=0.0, atol=floor, maxiter=_MOST_ITERATIONS, M=preconditioner)
-    if status != 0:
-        raise ReconstructionError("The reconstruction did not converge; the representation is too distorted.")
-    return np.asarray(column[free] + step)
+
+def _solve(matrix: csr_array, free: Bools, column: Floats, spans: Floats) -> Floats:
+    """Solve the free rows for their values, the others given; rows are of the size of ``spans``."""
+    inner = csr_array(matrix[free][:, free])
+    column = np.array(column)
+    last = np.inf
+    for _ in range(_MOST_CORRECTIONS):
+        # Solving for the correction of the guess: rounding in the iteration is made up for by the next one.
+        step = _conjugate_gradients(inner, -(matrix @ column)[free], spans[free])
+        column[free] += step
+        moved = float((np.abs(step) / spans[free]).max(initial=0.0))
+        if moved < _SETTLED or moved > 0.5 * last:
+            break
+        last = moved
+    return np.asarray(column[free])
+
+
+def _conjugate_gradients(matrix: csr_array, right: Floats, spans: Floats) -> Floats:
+    """Conjugate gradients, Jacobi-preconditioned, until the solution stops moving.
+
+    Residuals are no measure: where a map is very distorted, tiny ones leave large errors.
+    """
+    found = np.zeros_like(right)
+    inverse = 1.0 / matrix.diagonal()
+    residual = right
+    direction = inverse * residual
+    product = float(residual @ direction)
+    moves: list[float] = []
+    while product > 0.0:
+        if len(moves) == _MOST_ITERATIONS:
+            raise ReconstructionError("The reconstruction did not converge; the representation is too distorted.")
+        image = matrix @ direction
+        factor = product / float(direction @ image)
+        step = factor * direction
+        found += step
+        residual = residual - factor * image
+        moves.append(float((np.abs(step) / spans).max()))
+        recent = _LEAST_STEPS + len(moves) // _PART_OF_STEPS
+        if len(moves) > recent and sum(moves[-recent:]) < _STILL:
+            break
+        preconditioned = inverse * residual
+        following = float(residual @ preconditioned)
+        direction = preconditioned + following / product * direction
+        product = following
+    return found

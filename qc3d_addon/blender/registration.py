@@ -12,7 +12,7 @@ from ..worker import engines
 from . import cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -40,6 +40,7 @@ CLASSES = (
     QC3D_OT_bake_inbetweens,
     KeyChoice,
     QC3D_OT_bake_keys,
+    QC3D_OT_bake_objects,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,

@@ -145,7 +145,8 @@ def test_the_command(figure: bpy.types.Object, hat: bpy.types.Object, tmp_path: 
     before, after, report = (tmp_path / name for name in ("before.blend", "after.blend", "report.json"))
     bpy.ops.wm.save_as_mainfile(filepath=str(before))
     command = ["bake", str(before), "--object", "Figure", "--object", "Hat", "--together", "--frames", "2"]
-    assert main.main([*command, "--from", "Basis", "--to", "Lean", "--output", str(after), "--report", str(report)]) == 0
+    command += ["--from", "Basis", "--to", "Lean", "--output", str(after), "--report", str(report)]
+    assert main.main(command) == 0
     assert set(json.loads(report.read_text())) == {"Figure", "Hat"}
     bpy.ops.wm.open_mainfile(filepath=str(after))
     objects = [bpy.data.objects[name] for name in ("Figure", "Hat")]

@@ -187,7 +187,7 @@ def test_removing_leaves_nothing(rig: bpy.types.Object, state: State) -> None:
     before = state()
     assert bpy.ops.qc3d.combine_keys(first="Raise", second="Bend") == {"FINISHED"}
     assert state() != before
-    assert bpy.ops.qc3d.remove_combination(keys="Raise + Bend") == {"FINISHED"}
+    assert bpy.ops.qc3d.remove_combination(label="Raise + Bend") == {"FINISHED"}
     after = state()
     assert {**after, "keys": None} == {**before, "keys": None}
     assert after["keys"]["Key"]["blocks"] == before["keys"]["Key"]["blocks"]

@@ -18,6 +18,7 @@ from ...solver.errors import InputError
 from .. import compat
 from ..keys import shape_keys
 from ..keys.control import mute_path, value_path
+from ..kinds import keys_of, mesh_of, present
 from ..store import checks, combined_keys, names
 from ..store.combined_keys import Combined
 from ..store.mesh_data import key_coordinates, set_key_coordinates, triangles, wire_edges
@@ -103,7 +104,7 @@ def combine(
     from ...solver.support.progress import finish
 
     obj = checks.require_object(obj)
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     _require(obj, chosen)
     known = combined_keys.read(keys)
     made = {name for one in known for name, _ in one.made}
@@ -122,7 +123,7 @@ def combine(
     with probed(obj, chosen, own) as shown:
         present = {places: shown(places) for places in grid}
     together_keys = KeysOnBase(
-        base, [alone[number, 1.0] for number in range(len(chosen))], triangles(obj.data), wire_edges(obj.data)
+        base, [alone[number, 1.0] for number in range(len(chosen))], triangles(mesh_of(obj)), wire_edges(mesh_of(obj))
     )
     order = outermost_first(together_keys) if find_order else tuple(range(len(chosen)))
     composer = Composer(together_keys)
@@ -168,7 +169,7 @@ def finished(steps: Iterator[float | Made]) -> Made:
 
 def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
     """Remove the keys that were made for a combination; sentences about those that stay, since drivers read them."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     _require_unlocked(keys, [name for name, _ in combined.made])
     left = [one for one in combined_keys.read(keys) if one.keys != combined.keys]
     notes = shape_keys.remove_keys(obj, [keys.key_blocks[name] for name, _ in combined.made])
@@ -179,7 +180,7 @@ def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
 
 
 def _require(obj: bpy.types.Object, chosen: Sequence[str]) -> None:
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     if not 2 <= len(set(chosen)) == len(chosen) <= _MOST_KEYS:
         raise InputError(f"Combinations are of two or three different keys, and {len(chosen)} were named.")
     for name in chosen:
@@ -209,14 +210,14 @@ def _write(
     known: list[Combined],
 ) -> Combined:
     """Put corrections into keys: all of them or, where something fails, none. Those of an earlier time keep names."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     relative = keys.key_blocks[named[0]].relative_key
     start = key_coordinates(obj, relative.name)
     # The earlier time's values in the order of this one.
-    there = {
-        tuple(places[earlier.keys.index(name)] for name in named): name_of
-        for name_of, places in (earlier.made if earlier is not None else ())
-    }
+    there = {}
+    if earlier is not None:
+        own = [earlier.keys.index(name) for name in named]
+        there = {tuple(places[number] for number in own): name_of for name_of, places in earlier.made}
     active = obj.active_shape_key_index
     with ExitStack() as undo:
         made = []
@@ -247,7 +248,7 @@ def _drive(keys: bpy.types.Key, key: bpy.types.ShapeKey, named: Sequence[str], p
     path = value_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
     curve = compat.new_driver(keys, path) if curve is None else curve
-    driver = curve.driver
+    driver = present(curve.driver)
     driver.type = 'SCRIPTED'
     while driver.variables:
         driver.variables.remove(driver.variables[0])

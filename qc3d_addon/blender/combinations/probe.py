@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...solver.arrays import Floats
 from ..chains.absolute_copy import copied
 from ..keys.control import key_path, value_path
+from ..kinds import keys_of, mesh_of, present
 
 # Two evaluations in a row that agree are right: Blender's threads seldom evaluate a driver before what it reads.
 _MOST_EVALUATIONS = 10
@@ -36,12 +37,12 @@ def probed(
         copy = copied(obj, undo)
         collection = bpy.data.collections.new("QC3D probe")
         undo.callback(bpy.data.collections.remove, collection)
-        bpy.context.scene.collection.children.link(collection)
+        present(present(bpy.context.scene).collection).children.link(collection)
         collection.objects.link(copy)
         copy.modifiers.clear()
         copy.animation_data_clear()
         copy.show_only_shape_key = copy.hide_viewport = False
-        keys = copy.data.shape_keys
+        keys = keys_of(copy)
         _quiet(keys, names, left_out)
         own = [key for key in _named_after(keys, names) if key.name not in left_out]
 
@@ -69,7 +70,7 @@ def _quiet(keys: bpy.types.Key, names: Sequence[str], left_out: Collection[str])
             animation.nla_tracks.remove(track)
         still = [key_path(name) for name in (*names, *left_out)]
         for curve in list(animation.drivers):
-            targets = [target.id for variable in curve.driver.variables for target in variable.targets]
+            targets = [target.id for variable in present(curve.driver).variables for target in variable.targets]
             if keys not in targets or curve.data_path.startswith(tuple(still)):
                 keys.driver_remove(curve.data_path)
     for key in keys.key_blocks:
@@ -90,9 +91,9 @@ def _named_after(keys: bpy.types.Key, names: Sequence[str]) -> list[bpy.types.Sh
 
 
 def _evaluated(copy: bpy.types.Object) -> NDArray[np.float32]:
-    copy.data.shape_keys.update_tag()
+    keys_of(copy).update_tag()
     copy.update_tag()
-    mesh = copy.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = mesh_of(copy.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.vertices.foreach_get("co", values)
     return values.reshape(-1, 3)

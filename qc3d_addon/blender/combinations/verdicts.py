@@ -12,6 +12,7 @@ import bpy
 
 from ...solver.errors import InputError
 from ..bake.many import bakeable_keys
+from ..kinds import keys_of, mesh_of
 from ..store import checks
 from ..store.mesh_data import key_coordinates, shown_coordinates, triangles, wire_edges
 
@@ -55,7 +56,7 @@ def judge(obj: bpy.types.Object | None) -> Iterator[float]:
     from ...solver.combinations.verdicts import verdicts
 
     obj = checks.require_object(obj)
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     by_base: dict[str, list[str]] = {}
     for name in bakeable_keys(obj):
         by_base.setdefault(keys.key_blocks[name].relative_key.name, []).append(name)
@@ -68,7 +69,7 @@ def judge(obj: bpy.types.Object | None) -> Iterator[float]:
         # What a key adds to what it is relative to, as far as its vertex group lets it.
         start = key_coordinates(obj, base)
         whole = [shown_coordinates(obj, name) for name in names]
-        shapes = KeysOnBase(start, whole, triangles(obj.data), wire_edges(obj.data))
+        shapes = KeysOnBase(start, whole, triangles(mesh_of(obj)), wire_edges(mesh_of(obj)))
         for verdict in verdicts(shapes):
             inner = verdict.second if verdict.outer == verdict.first else verdict.first
             results.append(
@@ -82,6 +83,6 @@ def judge(obj: bpy.types.Object | None) -> Iterator[float]:
 
 def found(obj: bpy.types.Object) -> list[PairVerdict]:
     """The verdicts of the object's keys, those that need a combination first; empty before they were judged."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     blocks = keys.key_blocks
     return [one for one in _found.get(keys.session_uid, []) if one.outer in blocks and one.inner in blocks]

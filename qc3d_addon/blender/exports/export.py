@@ -16,6 +16,7 @@ from ...solver.errors import InputError
 from ...solver.files.atomic import replacing_all, require_room, require_writable
 from .. import native_files
 from ..keys import chain_keys, chain_shapes
+from ..kinds import keys_of, mesh_of, present
 from ..store import checks
 from ..store.records import Chain, Record
 from . import fbx_files, gltf_files, usd_files
@@ -58,9 +59,9 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     if suffix not in SUFFIXES:
         raise InputError(f"{path.name} ends in none of {', '.join(SUFFIXES)}; choose one of these formats.")
     require_writable(path)
-    names = [key.name for key in obj.data.shape_keys.key_blocks[1:]]
+    names = [key.name for key in keys_of(obj).key_blocks[1:]]
     # Beside its place: exporters write the paths of images relative to the file's own folder.
-    size = 12 * len(obj.data.vertices) * (len(names) + (density + 1) * len(chains))
+    size = 12 * len(mesh_of(obj).vertices) * (len(names) + (density + 1) * len(chains))
     with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
         native_files.require_short(unfinished, path)
         if suffix == ".glb":
@@ -80,7 +81,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 path,
                 size,
             )
-            fbx_files.add_in_betweens(unfinished, obj.data.name, found)
+            fbx_files.add_in_betweens(unfinished, mesh_of(obj).name, found)
         else:
             _called(
                 lambda: bpy.ops.wm.usd_export(
@@ -90,7 +91,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 path,
                 size,
             )
-            usd_files.add_in_betweens(unfinished, names, len(obj.data.vertices), found)
+            usd_files.add_in_betweens(unfinished, names, len(mesh_of(obj).vertices), found)
     return []
 
 
@@ -105,13 +106,13 @@ def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens
     places = np.linspace(0.0, 1.0, density + 2)[1:-1]
     shapes = chain_shapes.step_shapes(obj, chain)
     played = chain.weights.played(shapes, places)
-    made = frozenset(key.name for key in chain_keys.owned_keys(obj.data.shape_keys, chain).values())
+    made = frozenset(key.name for key in chain_keys.owned_keys(keys_of(obj), chain).values())
     return InBetweens(chain.on_key, made, places, played - shapes[0])
 
 
 def _chains(obj: bpy.types.Object) -> list[Chain]:
     """The in-betweens that the object's keys play by their own values."""
-    chains = [chain for chain in Record.read(obj.data.shape_keys).chains if chain.on_key]
+    chains = [chain for chain in Record.read(keys_of(obj)).chains if chain.on_key]
     if not chains:
         raise InputError(
             f"'{obj.name}' has no in-betweens on a key's own value, which is where other programs have them; bake some "
@@ -131,8 +132,8 @@ def _export_gltf(
         size,
     )
     frames, values = _values_over_time(obj)
-    render = bpy.context.scene.render
-    names = [key.name for key in obj.data.shape_keys.key_blocks]
+    render = present(bpy.context.scene).render
+    names = [key.name for key in keys_of(obj).key_blocks]
     seconds = frames * (render.fps_base / render.fps)
     gltf_files.set_weight_animation(unfinished, obj.name, names, seconds, values)
     return [
@@ -145,10 +146,10 @@ def _export_gltf(
 
 def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The scene's frames (f,), and the values (f, k) that the object's shape keys have there."""
-    scene = bpy.context.scene
+    scene = present(bpy.context.scene)
     before = scene.frame_current, scene.frame_subframe
     frames = range(scene.frame_start, scene.frame_end + 1)
-    values = np.empty((len(frames), len(obj.data.shape_keys.key_blocks)))
+    values = np.empty((len(frames), len(keys_of(obj).key_blocks)))
     try:
         for row, frame in enumerate(frames):
             scene.frame_set(frame)
@@ -166,8 +167,8 @@ def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
     """
     found = _values(obj)
     for _ in range(_MOST_EVALUATIONS):
-        obj.data.shape_keys.update_tag()
-        bpy.context.view_layer.update()
+        keys_of(obj).update_tag()
+        present(bpy.context.view_layer).update()
         before, found = found, _values(obj)
         if np.array_equal(before, found):
             break
@@ -175,21 +176,24 @@ def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 
 def _values(obj: bpy.types.Object) -> NDArray[np.float64]:
-    keys = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.shape_keys
+    keys = keys_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     return np.array([0.0 if key.mute else key.value for key in keys.key_blocks])
 
 
 @contextmanager
 def _alone(obj: bpy.types.Object) -> Iterator[None]:
     """Let the object be selected, with what it is a child of and the armatures that deform it, and nothing else."""
-    layer = bpy.context.view_layer
-    together = {obj, *(modifier.object for modifier in obj.modifiers if modifier.type == 'ARMATURE')}
+    layer = present(bpy.context.view_layer)
+    together = {obj}
+    for modifier in obj.modifiers:
+        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object is not None:
+            together.add(modifier.object)
     above = obj.parent
     while above is not None:
         together.add(above)
         above = above.parent
-    selected, active = set(bpy.context.selected_objects), layer.objects.active
-    hidden = [one for one in together if one is not None and one.name not in layer.objects]
+    selected, active = set(present(bpy.context.selected_objects)), layer.objects.active
+    hidden = [one for one in together if one.name not in layer.objects]
     if hidden:
         raise InputError(f"'{hidden[0].name}' is not in this view layer; switch its collection on first.")
     try:
@@ -205,7 +209,7 @@ def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: 
     layer.objects.active = active
 
 
-def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path, size: int) -> None:
+def _called(exporter: Callable[[], object], unfinished: Path, path: Path, size: int) -> None:
     """Run one of Blender's exporters, which writes a file of about ``size`` bytes.
 
     Raises

@@ -8,6 +8,7 @@ import bpy
 
 from ...solver.errors import InputError
 from ..combinations import verdicts
+from ..kinds import keys_of, present
 from ..operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, QC3D_OT_remove_combination
 from ..store import checks, combined_keys
 from .panel_texts import draw_sentence
@@ -31,13 +32,13 @@ class QC3D_PT_combinations(bpy.types.Panel):
         return checks.object_problem(context.active_object) is None
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, obj = self.layout, context.active_object
+        layout, obj = present(self.layout), present(context.active_object)
         buttons = layout.column(align=True)
         buttons.operator_context = IN_THE_SIDEBAR
         buttons.operator(QC3D_OT_combine_keys.bl_idname, text="Combine Keys…", icon='MOD_BOOLEAN')
         buttons.operator(QC3D_OT_judge_pairs.bl_idname, icon='VIEWZOOM')
         try:
-            made = combined_keys.read(obj.data.shape_keys)
+            made = combined_keys.read(keys_of(obj))
         except InputError as error:
             draw_sentence(context, layout, str(error), 'ERROR')
             return
@@ -50,7 +51,7 @@ class QC3D_PT_combinations(bpy.types.Panel):
             if len(one.keys) == 2:
                 turned = row.operator(QC3D_OT_combine_keys.bl_idname, text="", icon='ARROW_LEFTRIGHT')
                 turned.first, turned.second, turned.find_order = one.keys[1], one.keys[0], False
-            row.operator(QC3D_OT_remove_combination.bl_idname, text="", icon='TRASH').keys = one.label
+            row.operator(QC3D_OT_remove_combination.bl_idname, text="", icon='TRASH').label = one.label
         _draw_verdicts(context, layout, obj, {frozenset(one.keys) for one in made})
 
 

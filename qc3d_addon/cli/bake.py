@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         metavar="KEY",
         help="a shape key whose own value will play in-betweens, from the key that it is relative to; repeat for more",
     )
+    command.add_argument(
+        "--combine",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="KEY",
+        help="two shape keys or three that are on at once, to be corrected; once for each, after everything else",
+    )
     command.add_argument("--all-keys", action="store_true", help="like --on-key for all shape keys that need it")
     amount = command.add_mutually_exclusive_group()
     amount.add_argument("--frames", type=frame_count, metavar="N", help="number of in-betweens between every two keys")
@@ -80,11 +89,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def _run(arguments: argparse.Namespace) -> None:
     try:
         from ..blender.bake.run import bake_file, bake_object, bake_object_keys
+        from ..blender.combinations.combine import combine, finished
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     ways = [bool(arguments.on_keys), arguments.all_keys, any((arguments.first, arguments.last, arguments.via))]
-    if sum(ways) != 1:
-        raise InputError("Name the keys in one way: --from and --to, --on-key, or --all-keys; see qc3d bake --help.")
+    if sum(ways) > 1 or not (sum(ways) or arguments.combine):
+        raise InputError(
+            "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
+        )
     request = _request(arguments, is_pair=ways[2])
     with StageBars() as bars:
 
@@ -99,7 +111,15 @@ def _run(arguments: argparse.Namespace) -> None:
             values = [{"key": one.key, "ended": one.ended, "text": one.text, "report": one.report} for one in verdicts]
             return [f"{obj.name}: {verdict}" for verdict in verdicts], {"keys": values}
 
-        work = bake_pair if ways[2] else bake_keys
+        def combine_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
+            said, values = (bake_pair if ways[2] else bake_keys)(obj) if any(ways) else ([], {})
+            for names in arguments.combine:
+                made = finished(combine(obj, names, options=fit_options(arguments)))
+                said.append(f"{obj.name}: {made.text}")
+                values = {**values, "combinations": [*values.get("combinations", []), asdict(made)]}
+            return said, values
+
+        work = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
         told = bake_file(arguments.file, arguments.objects, work, arguments.output, arguments.report)
     sentences = [sentence for of_object in told for sentence in of_object]
     if ways[2]:

@@ -29,7 +29,7 @@ _LOOKED_AT = (0.25, 0.5, 0.75)
 # Enclosed volumes below this part of the largest have no deviation to speak of.
 _LEAST_VOLUME = 1e-6
 # Times that differ by less are one.
-_SAME = 1e-6
+_SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)

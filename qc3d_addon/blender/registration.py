@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 
 from ..worker import engines
@@ -70,7 +72,8 @@ def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
+    pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
+    setattr(bpy.types.Object, properties.SETTINGS, pointer(type=properties.ObjectSettings))
     jobs.register()
     menus.register()
     legend.register()
@@ -87,6 +90,6 @@ def unregister() -> None:
     menus.unregister()
     jobs.unregister()
     engines.forget()
-    del bpy.types.Object.qc3d
+    delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -11,6 +11,7 @@ import bpy
 
 from ..heat_map import heat_map
 from ..keys.chain_keys import base_key
+from ..kinds import keys_of
 from ..store import id_properties, kept_measures, kept_shapes
 from ..store.kept_measures import Measures
 from ..store.kept_shapes import Shapes
@@ -25,7 +26,7 @@ def remember(
 
     ``shapes`` are those that the bake made, by place, without what was sculpted into them.
     """
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     kept_shapes.keep(keys, chain.slider, key_coordinates(obj, base_key(keys, chain).name), shapes, undo)
     if measures:
         kept_measures.keep(keys, chain.slider, measures, undo)
@@ -52,7 +53,7 @@ def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -
 
 def forget_all(obj: bpy.types.Object) -> None:
     """Forget all that is kept with the keys of ``obj``, sound or not, and hide its heat map; keys and sliders stay."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     heat_map.hide(obj)
     with ExitStack() as undo:
         for name in [name for name in keys.keys() if name == PROPERTY or name.startswith(f"{PROPERTY}_")]:  # noqa: SIM118

@@ -19,6 +19,7 @@ from ...solver.errors import InputError
 from ..keys import chain_keys, chain_shapes, shape_keys
 from ..keys.double_motion import double_motion, unknown_inbetweens
 from ..keys.sculpted import Sculpted
+from ..kinds import keys_of
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
 from ..store.renames import digest
@@ -76,7 +77,7 @@ class Plan:
             raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
         checks.require_object(obj)
         try:
-            checks.require_control(obj.data.shape_keys, self.request.keys, self.request.base)
+            checks.require_control(keys_of(obj), self.request.keys, self.request.base)
             pairs = mesh_data.read_pairs(obj, self.request.keys, self.request.base)
         except InputError as error:
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. {error}") from error
@@ -96,7 +97,7 @@ def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    Record.read(obj.data.shape_keys)
+    Record.read(keys_of(obj))
     pairs = mesh_data.read_pairs(obj, request.keys)
     return Plan(request, Task(pairs, request.keys, request.fit_options), obj.session_uid, obj.name)
 
@@ -114,7 +115,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     checks.require_keys(keys, request.keys)
     if request.play_on == "auto":
@@ -152,7 +153,7 @@ def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
     InputError
         If the object cannot be used, or keys that the chain goes through are not there any more.
     """
-    problem = checks.chain_problem(checks.require_object(obj).data.shape_keys, chain)
+    problem = checks.chain_problem(keys_of(checks.require_object(obj)), chain)
     if problem is not None:
         raise InputError(problem)
     return BakeRequest.again(chain.through, chain.request)
@@ -169,7 +170,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     from ...solver.frames.bake import evenly_spaced
 
     request = request_again(obj, chain)
-    chain_keys.control_of(obj, chain).require()
+    chain_keys.control_of(checks.require_object(obj), chain).require()
     plan = plan_bake(obj, request)
     times = evenly_spaced(PREVIEW_STEPS * (len(request.keys) - 1) - 1)
     even = replace(request.frame_options, easing="linear")
@@ -184,7 +185,7 @@ def write_maps(plan: Plan, outcome: Outcome) -> None:
     InputError
         If the object is gone or was changed meanwhile; it is as it was.
     """
-    keys = plan.find_object().data.shape_keys
+    keys = keys_of(plan.find_object())
     record = Record.read(keys)
     with ExitStack() as undo:
         _keep_maps(keys, record, plan, outcome, undo)
@@ -204,7 +205,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     assert bake is not None
     played = bake.report.played
     assert played is not None
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)

@@ -14,6 +14,7 @@ import bpy
 
 from ...solver.errors import InputError
 from .. import native_files
+from ..kinds import keys_of, mesh_of
 from ..store import checks
 from .many import Verdict, bake_keys, bakeable_keys
 from .plan import Plan, plan_bake, write_bake
@@ -173,7 +174,7 @@ def _save(new: Path, output: Path, size: int) -> None:
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:
-    return len(obj.data.shape_keys.key_blocks) * len(obj.data.vertices) * 12
+    return len(keys_of(obj).key_blocks) * len(mesh_of(obj).vertices) * 12
 
 
 def _open(path: Path) -> None:

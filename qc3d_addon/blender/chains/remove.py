@@ -13,6 +13,7 @@ from ..bake import bookkeeping
 from ..heat_map import heat_map
 from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control
+from ..kinds import keys_of
 from ..store.records import Chain, Record
 
 
@@ -30,10 +31,10 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     """
     control = shape_keys.require_removable(obj, chain)
     hide_heat_map(obj, chain)
-    notes = shape_keys.remove_keys(obj, list(chain_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    notes = shape_keys.remove_keys(obj, list(chain_keys.owned_keys(keys_of(obj), chain).values()))
     notes += remove_slider(control, chain)
     with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
-        bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
+        bookkeeping.forget(keys_of(obj), record, chain, undo)
         undo.pop_all()
     return notes
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import chain_shapes, shape_keys
+from ..kinds import keys_of, mesh_of
 from ..store import checks, kept_measures, names
 from ..store.records import Chain, Record
 from . import remove
@@ -19,7 +20,7 @@ from . import remove
 
 def problem(obj: bpy.types.Object, chain: Chain) -> str | None:
     """Why the last key's value cannot play the in-betweens of a slider, or None. Quick enough for a panel."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     if chain.on_key:
         return f"The value of '{chain.on_key}' plays them already."
     return checks.chain_problem(keys, chain) or checks.control_problem(keys, chain.through, chain.through[0])
@@ -40,13 +41,13 @@ def play_on_key(obj: bpy.types.Object, record: Record, chain: Chain) -> tuple[Ch
     found = problem(obj, chain)
     if found is not None:
         raise InputError(found)
-    keys, name = obj.data.shape_keys, chain.through[-1]
+    keys, name = keys_of(obj), chain.through[-1]
     if record.chain_on_key(name) is not None:
         raise InputError(f"'{name}' plays in-betweens of its own already; remove those or these.")
     shape_keys.require_removable(obj, chain)
     shapes = chain_shapes.offsets_by_step(obj, chain.places, chain_shapes.step_shapes(obj, chain))
     label = names.chain_label((name,), {*obj.keys(), *(other.slider for other in record.chains)})
-    measures = kept_measures.read(keys, chain.slider, len(obj.data.vertices))
+    measures = kept_measures.read(keys, chain.slider, len(mesh_of(obj).vertices))
     moved = replace(
         chain, slider=label, keys={}, keyframes=None, request={**chain.request, "play_on": "key"}, on_key=name
     )

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ...solver.files.atomic import replacing_all, require_writable
+from ...solver.files.atomic import replacing_all, require_room, require_writable
 from .. import native_files
 from ..keys import chain_keys, chain_shapes
+from ..kinds import keys_of, mesh_of, present
 from ..store import checks
 from ..store.records import Chain, Record
 from . import fbx_files, gltf_files, usd_files
@@ -58,12 +59,13 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     if suffix not in SUFFIXES:
         raise InputError(f"{path.name} ends in none of {', '.join(SUFFIXES)}; choose one of these formats.")
     require_writable(path)
-    names = [key.name for key in obj.data.shape_keys.key_blocks[1:]]
+    names = [key.name for key in keys_of(obj).key_blocks[1:]]
     # Beside its place: exporters write the paths of images relative to the file's own folder.
+    size = 12 * len(mesh_of(obj).vertices) * (len(names) + (density + 1) * len(chains))
     with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
         native_files.require_short(unfinished, path)
         if suffix == ".glb":
-            return _export_gltf(obj, chains, unfinished, path)
+            return _export_gltf(obj, chains, unfinished, path, size)
         found = [in_betweens(obj, chain, density) for chain in chains]
         if suffix == ".fbx":
             _called(
@@ -77,8 +79,9 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 ),
                 unfinished,
                 path,
+                size,
             )
-            fbx_files.add_in_betweens(unfinished, obj.data.name, found)
+            fbx_files.add_in_betweens(unfinished, mesh_of(obj).name, found)
         else:
             _called(
                 lambda: bpy.ops.wm.usd_export(
@@ -86,8 +89,9 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
                 ),
                 unfinished,
                 path,
+                size,
             )
-            usd_files.add_in_betweens(unfinished, names, len(obj.data.vertices), found)
+            usd_files.add_in_betweens(unfinished, names, len(mesh_of(obj).vertices), found)
     return []
 
 
@@ -102,13 +106,13 @@ def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens
     places = np.linspace(0.0, 1.0, density + 2)[1:-1]
     shapes = chain_shapes.step_shapes(obj, chain)
     played = chain.weights.played(shapes, places)
-    made = frozenset(key.name for key in chain_keys.owned_keys(obj.data.shape_keys, chain).values())
+    made = frozenset(key.name for key in chain_keys.owned_keys(keys_of(obj), chain).values())
     return InBetweens(chain.on_key, made, places, played - shapes[0])
 
 
 def _chains(obj: bpy.types.Object) -> list[Chain]:
     """The in-betweens that the object's keys play by their own values."""
-    chains = [chain for chain in Record.read(obj.data.shape_keys).chains if chain.on_key]
+    chains = [chain for chain in Record.read(keys_of(obj)).chains if chain.on_key]
     if not chains:
         raise InputError(
             f"'{obj.name}' has no in-betweens on a key's own value, which is where other programs have them; bake some "
@@ -117,16 +121,19 @@ def _chains(obj: bpy.types.Object) -> list[Chain]:
     return chains
 
 
-def _export_gltf(obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path) -> list[str]:
+def _export_gltf(
+    obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path, size: int
+) -> list[str]:
     """Targets as they are in Blender, their weights written down at every frame."""
     _called(
         lambda: bpy.ops.export_scene.gltf(filepath=str(unfinished), export_format='GLB', use_selection=True),
         unfinished,
         path,
+        size,
     )
     frames, values = _values_over_time(obj)
-    render = bpy.context.scene.render
-    names = [key.name for key in obj.data.shape_keys.key_blocks]
+    render = present(bpy.context.scene).render
+    names = [key.name for key in keys_of(obj).key_blocks]
     seconds = frames * (render.fps_base / render.fps)
     gltf_files.set_weight_animation(unfinished, obj.name, names, seconds, values)
     return [
@@ -139,10 +146,10 @@ def _export_gltf(obj: bpy.types.Object, chains: list[Chain], unfinished: Path, p
 
 def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The scene's frames (f,), and the values (f, k) that the object's shape keys have there."""
-    scene = bpy.context.scene
+    scene = present(bpy.context.scene)
     before = scene.frame_current, scene.frame_subframe
     frames = range(scene.frame_start, scene.frame_end + 1)
-    values = np.empty((len(frames), len(obj.data.shape_keys.key_blocks)))
+    values = np.empty((len(frames), len(keys_of(obj).key_blocks)))
     try:
         for row, frame in enumerate(frames):
             scene.frame_set(frame)
@@ -160,8 +167,8 @@ def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
     """
     found = _values(obj)
     for _ in range(_MOST_EVALUATIONS):
-        obj.data.shape_keys.update_tag()
-        bpy.context.view_layer.update()
+        keys_of(obj).update_tag()
+        present(bpy.context.view_layer).update()
         before, found = found, _values(obj)
         if np.array_equal(before, found):
             break
@@ -169,21 +176,24 @@ def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 
 def _values(obj: bpy.types.Object) -> NDArray[np.float64]:
-    keys = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.shape_keys
+    keys = keys_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     return np.array([0.0 if key.mute else key.value for key in keys.key_blocks])
 
 
 @contextmanager
 def _alone(obj: bpy.types.Object) -> Iterator[None]:
     """Let the object be selected, with what it is a child of and the armatures that deform it, and nothing else."""
-    layer = bpy.context.view_layer
-    together = {obj, *(modifier.object for modifier in obj.modifiers if modifier.type == 'ARMATURE')}
+    layer = present(bpy.context.view_layer)
+    together = {obj}
+    for modifier in obj.modifiers:
+        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object is not None:
+            together.add(modifier.object)
     above = obj.parent
     while above is not None:
         together.add(above)
         above = above.parent
-    selected, active = set(bpy.context.selected_objects), layer.objects.active
-    hidden = [one for one in together if one is not None and one.name not in layer.objects]
+    selected, active = set(present(bpy.context.selected_objects)), layer.objects.active
+    hidden = [one for one in together if one.name not in layer.objects]
     if hidden:
         raise InputError(f"'{hidden[0].name}' is not in this view layer; switch its collection on first.")
     try:
@@ -199,8 +209,8 @@ def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: 
     layer.objects.active = active
 
 
-def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path) -> None:
-    """Run one of Blender's exporters.
+def _called(exporter: Callable[[], object], unfinished: Path, path: Path, size: int) -> None:
+    """Run one of Blender's exporters, which writes a file of about ``size`` bytes.
 
     Raises
     ------
@@ -213,6 +223,8 @@ def _called(exporter: Callable[[], set[str]], unfinished: Path, path: Path) -> N
         raise InputError(f"Blender's exporter for {path.suffix} is switched off; enable its add-on first.") from error
     except RuntimeError as error:
         words = native_files.words(error, unfinished, path)
+        require_room(path, size)  # exporters call a full disk anything
         raise InputError(f"{path} cannot be written: {words}.") from error
     if result != {'FINISHED'} or not unfinished.exists():
+        require_room(path, size)
         raise InputError(f"{path} was not written by Blender's exporter; try another folder.")

@@ -13,6 +13,7 @@ from ...solver.errors import InputError
 from ...solver.files.npz import require_file
 from ..bake import bookkeeping
 from ..keys import chain_shapes, shape_keys
+from ..kinds import keys_of, mesh_of
 from ..store import checks
 from ..store.mesh_data import key_coordinates
 from ..store.names import chain_label
@@ -37,8 +38,8 @@ def read_in_betweens(obj: bpy.types.Object | None, path: Path) -> list[str]:
     """
     obj = checks.require_object(obj)
     require_file(path)
-    keys = obj.data.shape_keys
-    found = usd_files.read_in_betweens(path, len(obj.data.vertices))
+    keys = keys_of(obj)
+    found = usd_files.read_in_betweens(path, len(mesh_of(obj).vertices))
     by_token = {usd_files.safe_name(key.name): key for key in keys.key_blocks[1:]}
     record = Record.read(keys)
     notes, done = [], []
@@ -68,4 +69,5 @@ def _write(obj: bpy.types.Object, record: Record, key: bpy.types.ShapeKey, shape
     shapes = chain_shapes.offsets_by_step(obj, places, frames)
     with shape_keys.chain_written(obj, chain, shapes, steps, None) as (undo, _):
         record.chains.append(chain)
-        bookkeeping.remember(obj, record, chain, None, undo)
+        made = {steps.places[step]: np.asarray(shape) for step, shape in shapes.items()}
+        bookkeeping.remember(obj, record, chain, None, made, undo)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
@@ -80,8 +80,12 @@ def add_in_betweens(path: Path, names: Sequence[str], vertices: int, found: Sequ
     for prim in stage.Traverse():
         if prim.IsA(skel.Animation):
             _leave_out(skel.Animation(prim), gone)
-    if not stage.GetRootLayer().Save():
-        raise InputError(f"{path.name} cannot be written; make room on the disk.")
+    try:
+        is_saved = stage.GetRootLayer().Save()
+    except Exception as error:  # pxr's own kind
+        raise InputError(f"{path.name} cannot be written: {reason(error)}; choose another place.") from error
+    if not is_saved:
+        raise InputError(f"{path.name} cannot be written; choose another place.")
 
 
 def read_in_betweens(path: Path, vertices: int) -> list[ReadShape]:
@@ -210,7 +214,9 @@ def _pxr(module: str) -> ModuleType:
         pass
     # Blender as a Python module has it in a folder of its own, which nothing is imported from.
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    folder = Path(bpy.utils.system_resource('PYTHON'), "lib", version, "site-packages")
+    # The stubs do not know this function of Blender's.
+    of_blender: Callable[[str], str] = vars(bpy.utils)["system_resource"]
+    folder = Path(of_blender('PYTHON'), "lib", version, "site-packages")
     spec = PathFinder.find_spec("pxr", [str(folder)])
     if spec is None or spec.loader is None:
         raise InputError("This Blender comes without USD's Python package; choose FBX, or another Blender.")

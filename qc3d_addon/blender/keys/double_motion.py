@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import bpy
 
 from .. import compat
+from ..kinds import expect, keys_of
 from ..store.records import Chain
 from . import drivers
 from .chain_keys import owned_keys
@@ -23,7 +24,7 @@ def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) 
     chains
         All of the object's.
     """
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     if chain.on_key:
         return []
     found = [_on_by_itself(key) for key in _own_keys(keys, chain)]
@@ -40,7 +41,7 @@ def _own_keys(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.ShapeKey]
 
 def _on_by_itself(key: bpy.types.ShapeKey) -> str:
     """What moves a key beside the slider; empty where nothing does."""
-    keys, path = key.id_data, value_path(key.name)
+    keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     animation = keys.animation_data
     if key.mute:
         return ""

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...solver.errors import InputError
+from ..kinds import keys_of, mesh_of
 from ..store import kept_shapes
 from ..store.kept_shapes import Shape, Shapes
 from ..store.mesh_data import key_coordinates
@@ -48,9 +49,9 @@ class Sculpted:
     @classmethod
     def of(cls, obj: bpy.types.Object, chain: Chain) -> Sculpted:
         """Those of an earlier bake of a chain, none where there was none."""
-        keys = obj.data.shape_keys
+        keys = keys_of(obj)
         owned = owned_keys(keys, chain)
-        kept = kept_shapes.read(keys, chain.slider, len(obj.data.vertices)) if owned else None
+        kept = kept_shapes.read(keys, chain.slider, len(mesh_of(obj).vertices)) if owned else None
         base_before, before = kept or (np.empty((0, 3), np.float32), {})
         base = key_coordinates(obj, base_key(keys, chain).name)
         held = {}

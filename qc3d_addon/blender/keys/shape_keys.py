@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from .. import compat
+from ..kinds import keys_of
 from ..store import names
 from ..store.mesh_data import key_coordinates, set_key_coordinates
 from ..store.records import LEAST_DISTANCE, Chain
@@ -54,7 +56,7 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
     InputError
         If a key is locked, or the slider's object or its action is linked.
     """
-    for key in owned_keys(obj.data.shape_keys, chain).values():
+    for key in owned_keys(keys_of(obj), chain).values():
         if key.lock_shape:
             raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
     control = _require_local(obj, chain)
@@ -63,7 +65,7 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
     return control
 
 
-def require_action(block: bpy.types.ID) -> None:
+def require_action(block: compat.Animated) -> None:
     """Raise InputError where the keyframes of an object or of shape keys cannot be changed."""
     action = block.animation_data and block.animation_data.action
     if action and (action.library or action.override_library):
@@ -114,16 +116,17 @@ def chain_written(
         If a key or action cannot be written, or the slider is not a number any more.
     """
     require_writable(obj, chain, keyframes)
-    keys, control = obj.data.shape_keys, control_of(obj, chain)
+    keys, control = keys_of(obj), control_of(obj, chain)
     base = base_key(keys, chain)
     owned = owned_keys(keys, chain)
     kept = _kept(chain, owned, steps.places, shapes)
     stale = [key for key in owned.values() if key not in kept.values()]
     active = obj.active_shape_key
-    curve, notes = None, []
+    curve: bpy.types.FCurve | None = None
+    notes: list[str] = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
-        if not control.is_key:
+        if isinstance(control.owner, bpy.types.Object):
             # A slider that starts where it shows the Basis leaves the object looking as it did.
             start = min(set(range(len(steps.places))) - shapes.keys(), default=0)
             slider.ensure_property(control.owner, chain.slider, steps.places[start], undo)
@@ -151,7 +154,7 @@ def chain_written(
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
     _let_play(kept, control, weights)
-    if curve is not None:
+    if curve is not None and keyframes is not None:
         slider.set_keyframes(curve, keyframes)
     remove_keys(obj, stale)
 
@@ -188,7 +191,7 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
     """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
     notes = []
-    read = drivers.paths_read(obj.data.shape_keys) if stale else {}
+    read = drivers.paths_read(keys_of(obj)) if stale else {}
     for key in stale:
         readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
         if readers:
@@ -199,7 +202,7 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
         else:
             _remove_key(obj, key)
     _activate(obj, active)
-    obj.data.shape_keys.update_tag()
+    keys_of(obj).update_tag()
     return notes
 
 
@@ -232,4 +235,4 @@ def _remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
 
 
 def _activate(obj: bpy.types.Object, key: bpy.types.ShapeKey | None) -> None:
-    obj.active_shape_key_index = 0 if key is None else obj.data.shape_keys.key_blocks.find(key.name)
+    obj.active_shape_key_index = 0 if key is None else keys_of(obj).key_blocks.find(key.name)

@@ -5,7 +5,7 @@
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
@@ -13,7 +13,8 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ...solver.errors import InputError, QC3DError
 from .. import live_scrub
 from ..exports import export, read_usd
-from .common import poll_active_object, poll_chains
+from ..kinds import present
+from .common import Status, poll_active_object, poll_chains
 
 _FORMATS = (
     ('.usdc', "USD", "In-betweens of blend shapes: Maya, Unreal, Houdini"),
@@ -28,29 +29,38 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
 
     bl_idname = "qc3d.export_in_betweens"
     bl_label = "Export In-Betweens"
-    bl_options: ClassVar[set[str]] = {'REGISTER'}  # nothing in the file changes
+    bl_options = {'REGISTER'}  # nothing in the file changes
 
-    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
-    check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
-    filter_glob: StringProperty(
-        default=";".join(f"*{ending}" for ending in export.SUFFIXES), options={'HIDDEN', 'SKIP_SAVE'}
-    )
-    format: EnumProperty(name="Format", items=_FORMATS, description="Used where the name of the file has no ending")
-    density: IntProperty(
-        name="Shapes",
-        description="In-betweens of each key in USD and FBX, whose readers go straight from one to the next",
-        default=export.DENSITY,
-        min=1,
-        max=99,
-    )
+    if TYPE_CHECKING:
+        filepath: str
+        check_existing: bool
+        filter_glob: str
+        format: str
+        density: int
+    else:
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        filter_glob: StringProperty(
+            default=";".join(f"*{ending}" for ending in export.SUFFIXES), options={'HIDDEN', 'SKIP_SAVE'}
+        )
+        format: EnumProperty(
+            name="Format", items=_FORMATS, description="Used where the name of the file has no ending"
+        )
+        density: IntProperty(
+            name="Shapes",
+            description="In-betweens of each key in USD and FBX, whose readers go straight from one to the next",
+            default=export.DENSITY,
+            min=1,
+            max=99,
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{bpy.path.clean_name(context.active_object.name)}{self.format}"
-        context.window_manager.fileselect_add(self)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        self.filepath = f"{bpy.path.clean_name(present(context.active_object).name)}{self.format}"
+        present(context.window_manager).fileselect_add(self)
         return {'RUNNING_MODAL'}
 
     def check(self, context: bpy.types.Context) -> bool:
@@ -61,7 +71,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
         self.filepath = str(path.with_suffix(self.format))
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         live_scrub.end()
         try:
             path = _path(self.filepath)
@@ -72,7 +82,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
             return {'CANCELLED'}
         for note in notes:
             self.report({'WARNING'}, note)
-        self.report({'INFO'}, f"{path.name} has '{context.active_object.name}' with its in-betweens.")
+        self.report({'INFO'}, f"{path.name} has '{present(context.active_object).name}' with its in-betweens.")
         return {'FINISHED'}
 
 
@@ -81,20 +91,24 @@ class QC3D_OT_read_usd(bpy.types.Operator):
 
     bl_idname = "qc3d.read_usd"
     bl_label = "Read In-Betweens from USD"
-    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+    bl_options = {'REGISTER', 'UNDO'}
 
-    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
-    filter_glob: StringProperty(default="*.usd;*.usda;*.usdc;*.usdz", options={'HIDDEN', 'SKIP_SAVE'})
+    if TYPE_CHECKING:
+        filepath: str
+        filter_glob: str
+    else:
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        filter_glob: StringProperty(default="*.usd;*.usda;*.usdc;*.usdz", options={'HIDDEN', 'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        present(context.window_manager).fileselect_add(self)
         return {'RUNNING_MODAL'}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         live_scrub.end()
         try:
             *notes, done = read_usd.read_in_betweens(context.active_object, _path(self.filepath))

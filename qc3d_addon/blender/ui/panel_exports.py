@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..kinds import present
 from ..operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from ..store import checks
 from .panels import IN_THE_SIDEBAR, QC3D_PT_inbetweens
@@ -26,7 +27,7 @@ class QC3D_PT_exports(bpy.types.Panel):
         return checks.object_problem(context.active_object) is None
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
+        column = present(self.layout).column(align=True)
         column.operator_context = IN_THE_SIDEBAR
         for ending, text in (('.usdc', "USD"), ('.fbx', "FBX"), ('.glb', "glTF")):
             button = column.operator(QC3D_OT_export_in_betweens.bl_idname, text=f"Export {text}", icon='EXPORT')

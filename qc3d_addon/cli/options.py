@@ -21,7 +21,7 @@ _HELP = {
     "weights": "what is played between in-betweens",
     "stretch": "how mode natural interpolates stretches",
     "engine": "what fills the volume around the mesh",
-    "quality": "how fine the volume is",
+    "quality": "how fine the volume is; exact: as fine as the mesh, so that the map meets both keys",
     "extra_turns": "full turns that two shapes cannot tell",
     "seed": "of the delaunay engine's samples",
 }

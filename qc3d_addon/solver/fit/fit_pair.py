@@ -57,21 +57,20 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     embedding = Embedding.of(pair)
     fitted = yield from (_meeting if options.quality == "exact" else _near)(embedding, options, seconds)
     missed = fitted.landmark_residual().rms
+    notes = [*fitted.notes]
     if out_of_reach.parts:
-        note = (
+        notes.append(
             f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys, which no motion of a "
             "volume can do. Mode straight may look as good."
         )
     elif missed > _LARGE_RESIDUAL:
-        note = (
+        notes.append(
             f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
             "the second key crosses itself or is flattened. Mode straight may look as good."
         )
-    elif options.quality == "exact":
-        note = _missed_note(fitted)
-    else:
-        note = ""
-    return replace(fitted, notes=(*fitted.notes, note)) if note else fitted
+    if options.quality == "exact":
+        notes += _missed_notes(fitted)
+    return replace(fitted, notes=tuple(notes))
 
 
 def _near(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
@@ -126,18 +125,18 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
     )
 
 
-def _missed_note(fitted: FittedMap) -> str:
-    """Which vertices a map that is to meet the second key misses; empty where it meets all."""
+def _missed_notes(fitted: FittedMap) -> list[str]:
+    """A sentence about the vertices that a map which is to meet the second key misses, where there are any."""
     missed = fitted.missed()
     worst = np.argsort(-missed, kind="stable")[: np.count_nonzero(missed > MET)]
     if not len(worst):
-        return ""
+        return []
     crossing = np.count_nonzero(crossing_vertices(fitted.embedding)[worst])
     named = ", ".join(str(vertex) for vertex in worst[:_MOST_NAMED]) + (", …" if len(worst) > _MOST_NAMED else "")
-    return (
+    return [
         f"The map meets {len(missed) - len(worst)} of {len(missed)} vertices to {MET:.2%} of the size, and misses "
         f"{len(worst)}, {crossing} of them where a key crosses itself: {named}."
-    )
+    ]
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:

@@ -31,7 +31,7 @@ from .unfolding import unfolded_nearby
 
 MET = 1e-4  # of the diagonal: a vertex that is missed by no more is met
 _WEIGHTS = (1e5, 1e6, 1e7, 1e8)
-_ITERATIONS = 20
+_ITERATIONS = 15
 _REPAIR_ITERATIONS = 15
 # Landmarks that are missed by more than this part of the diagonal do not pull harder with it: what cannot be reached,
 # such as where a key crosses itself, would hold up all that can.

@@ -22,10 +22,10 @@ from ..numerics.rotations import determinants
 from ..tets.mesh import TetMesh
 from .fold_free import LANDMARK_WEIGHT, FoldFreeFitter, Misfit
 
-_TOLERANCE = 0.03
-_MOST_PRODUCTS = 120
+_TOLERANCE = 0.06
+_PRODUCTS = 5, 120  # fewer have not seen more than the stiffest equations
 _MANY_PRODUCTS = 25  # after so many the preconditioner is made anew
-_SETTLED = 1e-2  # of what the energy is above its least, the identity's 1
+_SETTLED = 3e-2  # of what the energy is above its least, the identity's 1
 _HALVINGS = 9
 _LEAST_LEFT = 0.25  # a tetrahedron keeps this part of its determinant in a step
 _GROWTH, _RINGS = 1.25, 24  # how fast steps grow again around what holds them back
@@ -62,11 +62,9 @@ class StiffFitter(FoldFreeFitter):
 
     def _forget_factors(self) -> None:
         self._factors: SuperLU | None = None
-        self._products = 0
 
     def _settled(self, decrease: float, energy: float) -> bool:
-        # One product is too few to have seen more than the stiffest equations.
-        return self._products > 1 and decrease < _SETTLED * (energy - 1.0)
+        return decrease < _SETTLED * (energy - 1.0)
 
     def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
         matrix = self._pattern.assemble_blocks(element_blocks)
@@ -86,8 +84,8 @@ class StiffFitter(FoldFreeFitter):
             return np.asarray(matrix @ (vector * free) * free)
 
         load = -gradient.ravel()
-        step, self._products = conjugate_gradients(multiply, precondition, load, _TOLERANCE, _MOST_PRODUCTS)
-        if self._products > _MANY_PRODUCTS:
+        step, products = conjugate_gradients(multiply, precondition, load, _TOLERANCE, _PRODUCTS)
+        if products > _MANY_PRODUCTS:
             self._factors = None
         return step.reshape(-1, 3)
 

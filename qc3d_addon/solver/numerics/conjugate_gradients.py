@@ -18,7 +18,7 @@ Product = Callable[[Floats], Floats]
 
 
 def conjugate_gradients(
-    multiply: Product, precondition: Product, load: Floats, tolerance: float, most_steps: int
+    multiply: Product, precondition: Product, load: Floats, tolerance: float, steps: tuple[int, int]
 ) -> tuple[Floats, int]:
     """Solve A x = load for a symmetric positive definite A.
 
@@ -29,20 +29,21 @@ def conjugate_gradients(
     load : (n,)
     tolerance : float
         The end is where rᵀ M⁻¹ r, of the residual r and the preconditioner M, is this squared times its first value.
-    most_steps : int
+    steps : (int, int)
+        At least so many steps are taken, unless the residual vanishes, and at most so many.
 
     Returns
     -------
     solution : (n,)
-    steps : int
-        How many were taken.
+    taken : int
+        How many steps were taken.
     """
     solution, residual = np.zeros_like(load), load.copy()
     corrected = precondition(residual)
     direction = corrected
     first = left = float(residual @ corrected)
-    steps = 0
-    while steps < most_steps and left > tolerance**2 * first:
+    taken = 0
+    while taken < steps[1] and left > (tolerance**2 * first if taken >= steps[0] else 0.0):
         product = multiply(direction)
         length = left / float(direction @ product)
         solution = solution + length * direction
@@ -50,5 +51,5 @@ def conjugate_gradients(
         corrected = precondition(residual)
         before, left = left, float(residual @ corrected)
         direction = corrected + (left / before) * direction
-        steps += 1
-    return solution, steps
+        taken += 1
+    return solution, taken

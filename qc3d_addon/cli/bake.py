@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +39,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("file", type=Path, metavar="FILE.blend", help="a file with a mesh that has two shape keys")
     objects = command.add_mutually_exclusive_group(required=True)
     objects.add_argument(
-        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; once for each"
+        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; repeat for more"
     )
-    objects.add_argument("--all-objects", action="store_true", help="every mesh with two shape keys or more")
+    objects.add_argument("--all-objects", action="store_true", help="all meshes with two or more shape keys")
     add_way(command, "shape key", is_required=False)
     command.add_argument(
         "--on-key",
@@ -48,30 +49,38 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         action="append",
         default=[],
         metavar="KEY",
-        help="a shape key whose own value is to play in-betweens from what it is relative to; once for each",
+        help="a shape key whose own value will play in-betweens, from the key that it is relative to; repeat for more",
     )
-    command.add_argument("--all-keys", action="store_true", help="the same for every shape key that needs it")
+    command.add_argument(
+        "--combine",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="KEY",
+        help="two shape keys or three that are on at once, to be corrected; once for each, after everything else",
+    )
+    command.add_argument("--all-keys", action="store_true", help="like --on-key for all shape keys that need it")
     amount = command.add_mutually_exclusive_group()
     amount.add_argument("--frames", type=frame_count, metavar="N", help="number of in-betweens between every two keys")
     amount.add_argument(
-        "--tolerance", type=float, metavar="T", help="as few in-betweens as play the motion within this distance"
+        "--tolerance", type=float, metavar="T", help="as few in-betweens as keep the motion within this distance"
     )
-    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the file itself")
+    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the input file")
     command.add_argument(
         "--keyframes",
         type=whole_number,
         nargs=2,
         metavar=("FIRST", "LAST"),
-        help="animate what plays them over these frames",
+        help="animate the key or slider that plays the in-betweens over these frames",
     )
     command.add_argument(
         "--play-on",
         choices=("auto", "key", "slider"),
         default="auto",
-        help="what plays them: the last key's own value, or a slider of their own (default: the key where it can be)",
+        help="what plays the in-betweens: the last key's own value or a separate slider (default: the key if possible)",
     )
     command.add_argument(
-        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
+        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not enter"
     )
     add_options(command, FrameOptions, FitOptions, PlayOptions)
     command.set_defaults(run=_run)
@@ -80,11 +89,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def _run(arguments: argparse.Namespace) -> None:
     try:
         from ..blender.bake.run import bake_file, bake_object, bake_object_keys
+        from ..blender.combinations.combine import combine, finished
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     ways = [bool(arguments.on_keys), arguments.all_keys, any((arguments.first, arguments.last, arguments.via))]
-    if sum(ways) != 1:
-        raise InputError("Name the keys in one way: --from and --to, --on-key, or --all-keys; see qc3d bake --help.")
+    if sum(ways) > 1 or not (sum(ways) or arguments.combine):
+        raise InputError(
+            "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
+        )
     request = _request(arguments, is_pair=ways[2])
     with StageBars() as bars:
 
@@ -99,7 +111,15 @@ def _run(arguments: argparse.Namespace) -> None:
             values = [{"key": one.key, "ended": one.ended, "text": one.text, "report": one.report} for one in verdicts]
             return [f"{obj.name}: {verdict}" for verdict in verdicts], {"keys": values}
 
-        work = bake_pair if ways[2] else bake_keys
+        def combine_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
+            said, values = (bake_pair if ways[2] else bake_keys)(obj) if any(ways) else ([], {})
+            for names in arguments.combine:
+                made = finished(combine(obj, names, options=fit_options(arguments)))
+                said.append(f"{obj.name}: {made.text}")
+                values = {**values, "combinations": [*values.get("combinations", []), asdict(made)]}
+            return said, values
+
+        work = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
         told = bake_file(arguments.file, arguments.objects, work, arguments.output, arguments.report)
     sentences = [sentence for of_object in told for sentence in of_object]
     if ways[2]:

@@ -14,6 +14,7 @@ import bpy
 
 from ...solver.errors import InputError
 from .. import native_files
+from ..kinds import keys_of, mesh_of
 from ..store import checks
 from .many import Verdict, bake_keys, bakeable_keys
 from .plan import Plan, plan_bake, write_bake
@@ -127,6 +128,18 @@ def bake_file(
     return [result for result, _ in done.values()]
 
 
+def opened_object(path: Path, name: str) -> bpy.types.Object:
+    """An object of a .blend file, which is opened in place of what is open; scripts in it do not run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or has no such object.
+    """
+    _open(path)
+    return _objects(path, [name])[0]
+
+
 def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
     """The objects of these names, or all meshes with keys that do not share their mesh with one before."""
     meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH']
@@ -161,7 +174,7 @@ def _save(new: Path, output: Path, size: int) -> None:
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:
-    return len(obj.data.shape_keys.key_blocks) * len(obj.data.vertices) * 12
+    return len(keys_of(obj).key_blocks) * len(mesh_of(obj).vertices) * 12
 
 
 def _open(path: Path) -> None:

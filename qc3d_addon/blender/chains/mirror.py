@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import chain_keys, shape_keys
+from ..keys.sculpted import Sculpted
+from ..kinds import keys_of, mesh_of
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
@@ -39,12 +41,12 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
 
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     steps = chain_keys.all_owned_keys(keys, chain)
     base = chain_keys.base_key(keys, chain).name
     rest = key_coordinates(obj, keys.reference_key.name)
-    ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
-    obj.data.edges.foreach_get("vertices", ends)
+    ends = np.empty(2 * len(mesh_of(obj).edges), dtype=np.int32)
+    mesh_of(obj).edges.foreach_get("vertices", ends)
     partners = mirror_partners(rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64))
     flipped = np.array([-1.0, 1.0, 1.0], dtype=np.float32)
     shapes = {step: key_coordinates(obj, key.name)[partners] * flipped for step, key in steps.items()}
@@ -69,18 +71,21 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
     places = shape_keys.Steps(chain.places, chain.corners)
+    sculpted = Sculpted.of(obj, mirrored)
+    sculpted.require_among(chain.places)
+    shapes, made, _ = sculpted.kept(chain.places, shapes)
     with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
-        bookkeeping.remember(obj, record, mirrored, measures, undo)
+        bookkeeping.remember(obj, record, mirrored, measures, made, undo)
     return mirrored
 
 
 def _require_mirror_image(obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str) -> None:
     """Raise InputError unless the key of that name has this shape and is relative to ``base``."""
-    key = obj.data.shape_keys.key_blocks.get(name)
+    key = keys_of(obj).key_blocks.get(name)
     if key is None:
         raise InputError(f"There is no key '{name}' for the mirror image; mirror the key first.")
     size = float(np.ptp(shape, axis=0).max())

@@ -10,7 +10,8 @@ import bpy
 
 from .. import live_scrub
 from ..bake.plan import Plan, plan_bake, request_again, write_bake
-from ..properties import BakeChoices, bake_request, fill_from_panel
+from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..store import checks
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
 
@@ -29,8 +30,8 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
         return poll_active_object(cls, context) and poll_panel_keys(cls, context)
 
     def plan(self, context: bpy.types.Context) -> Plan:
-        obj = context.active_object
-        fill_from_panel(self.properties, obj.qc3d)
+        obj = checks.require_object(context.active_object)
+        fill_from_panel(self.properties, settings_of(obj))
         return plan_bake(obj, bake_request(self))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:

@@ -31,7 +31,7 @@ from .unfolding import unfolded_nearby
 
 MET = 1e-4  # of the diagonal: a vertex that is missed by no more is met
 _WEIGHTS = (1e5, 1e6, 1e7, 1e8)
-_ITERATIONS = 15
+_ITERATIONS = (15, 15, 12, 6)  # with each weight, at most
 _REPAIR_ITERATIONS = 15
 # Landmarks that are missed by more than this part of the diagonal do not pull harder with it: what cannot be reached,
 # such as where a key crosses itself, would hold up all that can.
@@ -84,7 +84,7 @@ def meet_keys(
     way = follow_path(FoldFreeFitter(coarse, coarse_landmarks, base), targets)
     followed = yield from told(way, lambda part: 0.1 * part)
     followed.maps[-1] = StiffFitter(coarse, coarse_landmarks, _WEIGHTS[0] / LANDMARK_WEIGHT * base).fit(
-        followed.maps[-1], embedding.key1, _ITERATIONS
+        followed.maps[-1], embedding.key1, _ITERATIONS[0]
     )
     fitter = StiffFitter(mesh, interpolation_matrix(mesh, embedding.key0), base)
     carry = interpolation_matrix(coarse, mesh.points)
@@ -95,9 +95,9 @@ def meet_keys(
         yield 0.1 + 0.1 * step / len(maps)
     diagonal = embedding.pair.diagonal * embedding.scale
     weights = base
-    for number, weight in enumerate(_WEIGHTS):
+    for number, (weight, iterations) in enumerate(zip(_WEIGHTS, _ITERATIONS, strict=True)):
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
-        maps[-1] = fitter.fit(maps[-1], embedding.key1, _ITERATIONS)
+        maps[-1] = fitter.fit(maps[-1], embedding.key1, iterations)
         missed = np.linalg.norm(fitter.residuals(maps[-1], embedding.key1), axis=1) / diagonal
         if missed.max() <= 0.5 * MET:
             break

@@ -27,6 +27,7 @@ _PRODUCTS = 5, 120  # fewer have not seen more than the stiffest equations
 _MANY_PRODUCTS = 25  # after so many the preconditioner is made anew
 _SETTLED = 3e-2  # of what the energy is above its least, the identity's 1
 _HALVINGS = 9
+_LEAST_LENGTH = 1e-3  # of a step that is worth another one
 _LEAST_LEFT = 0.25  # a tetrahedron keeps this part of its determinant in a step
 _GROWTH, _RINGS = 1.25, 24  # how fast steps grow again around what holds them back
 
@@ -99,7 +100,7 @@ class StiffFitter(FoldFreeFitter):
         reached = self._energy(held_back, misfit)
         if reached < (energy if length == 0.0 else self._energy(moved, misfit)):
             return 0.5, held_back
-        return length, moved
+        return (length, moved) if length >= _LEAST_LENGTH else (0.0, values)
 
     def _lengths(self, values: Floats, step: Floats) -> Floats:
         """(N,) how far each vertex may go along a step: short around tetrahedra that would fold, growing away."""

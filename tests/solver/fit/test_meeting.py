@@ -75,7 +75,7 @@ def test_a_bar_that_is_twisted() -> None:
 def test_a_ball_with_bumps(bumpy: FittedMap) -> None:
     assert_met(bumpy)
     coarse = finish(fit_pair(bumpy.pair, FitOptions()))
-    assert coarse.missed().max() > 10.0 * MET
+    assert coarse.missed().max() > 4.0 * MET
 
 
 def test_its_linear_frames_are_proven(bumpy: FittedMap) -> None:
@@ -104,7 +104,7 @@ def test_by_the_api() -> None:
 
 
 def test_vertices_that_cannot_be_met_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meeting, "_ITERATIONS", 2)
+    monkeypatch.setattr(meeting, "_ITERATIONS", (2, 2, 2, 2))
     points, faces = icosphere(1, 1.0)
     middle = points.mean(axis=0)
     pushed = points.copy()

@@ -12,7 +12,7 @@ from ..worker import engines
 from . import cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -31,6 +31,7 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_ke
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
+from .operators.split_key import QC3D_OT_split_key
 from .ui import menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
@@ -41,6 +42,8 @@ CLASSES = (
     QC3D_OT_bake_inbetweens,
     KeyChoice,
     QC3D_OT_bake_keys,
+    QC3D_OT_bake_objects,
+    QC3D_OT_split_key,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,11 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; repeat for more"
     )
     objects.add_argument("--all-objects", action="store_true", help="all meshes with two or more shape keys")
+    command.add_argument(
+        "--together",
+        action="store_true",
+        help="bake the objects in one map, so that what coincides stays together; the first one's control drives all",
+    )
     add_way(command, "shape key", is_required=False)
     command.add_argument(
         "--on-key",
@@ -88,7 +94,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def _run(arguments: argparse.Namespace) -> None:
     try:
-        from ..blender.bake.run import bake_file, bake_object, bake_object_keys
+        from ..blender.bake.run import bake_file, bake_object, bake_object_keys, bake_objects_together
         from ..blender.combinations.combine import combine, finished
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
@@ -97,6 +103,8 @@ def _run(arguments: argparse.Namespace) -> None:
         raise InputError(
             "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
         )
+    if arguments.together and not (ways[2] and not arguments.combine):
+        raise InputError("Objects are baked together from one key to another: name these by --from and --to.")
     request = _request(arguments, is_pair=ways[2])
     with StageBars() as bars:
 
@@ -119,11 +127,19 @@ def _run(arguments: argparse.Namespace) -> None:
                 values = {**values, "combinations": [*values.get("combinations", []), asdict(made)]}
             return said, values
 
-        work = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
+        def bake_one_by_one(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
+            one = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
+            return [one(obj) for obj in objects]
+
+        def bake_together(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
+            results = bake_objects_together(objects, request, on_progress=bars)
+            return [(list(result.notes), result.report) for result in results]
+
+        work = bake_together if arguments.together else bake_one_by_one
         told = bake_file(arguments.file, arguments.objects, work, arguments.output, arguments.report)
     sentences = [sentence for of_object in told for sentence in of_object]
     if ways[2]:
-        print_notes(sentences)
+        print_notes(dict.fromkeys(sentences))
     else:
         for sentence in sentences:
             speech.say(sentence)

@@ -116,4 +116,5 @@ class LoosePieces:
         corners = shape[self._faces[first]] - shape[self._faces[second][:, :1]]
         heights = np.einsum("kij,kj->ki", corners, normals)
         up, down = -heights.min(axis=1), heights.max(axis=1)
-        return np.where(up < down, up, -down)[:, None] * normals
+        moves: Floats = np.where(up < down, up, -down)[:, None] * normals
+        return moves

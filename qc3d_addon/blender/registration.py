@@ -31,6 +31,7 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_scul
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
+from .operators.split_key import QC3D_OT_split_key
 from .ui import bake_list, menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
@@ -42,6 +43,7 @@ CLASSES = (
     KeyChoice,
     QC3D_OT_bake_keys,
     QC3D_OT_bake_objects,
+    QC3D_OT_split_key,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,

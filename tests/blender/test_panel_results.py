@@ -45,6 +45,9 @@ class Layout:
         assert hasattr(bpy.types, kind)
         self.lists.append((len(getattr(data, collection)), rows["rows"]))
 
+    def separator(self) -> None:
+        pass
+
     def box(self) -> Layout:
         return self
 

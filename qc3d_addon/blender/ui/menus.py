@@ -9,17 +9,19 @@ import bpy
 from ..kinds import present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from ..operators.bake_keys import QC3D_OT_bake_keys
+from ..operators.split_key import QC3D_OT_split_key
 
 _OTHER_WORDS = "(Breakdown, Tween)"  # what animators look for; Blender's search knows only what an entry says
 
 
 def _draw_keys(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """In the menu beside the list of shape keys: bake the active key, those that are selected, or all."""
+    """In the menu beside the list of shape keys: bake the active key, those selected, or all; split one."""
     layout = present(menu.layout)
     layout.separator()
     layout.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
     layout.operator(QC3D_OT_bake_keys.bl_idname, text="Bake In-Betweens of Selected Keys").which = "selected"
     layout.operator(QC3D_OT_bake_keys.bl_idname, text="Bake In-Betweens of All Keys").which = "all"
+    layout.operator(QC3D_OT_split_key.bl_idname)
 
 
 def _draw_animation(menu: bpy.types.Menu, context: bpy.types.Context) -> None:

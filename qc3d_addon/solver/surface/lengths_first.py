@@ -41,6 +41,7 @@ class LengthsFirst:
         self._edges = edges[usable]
         self._shortest, self._longest = np.minimum(*ends)[usable], np.maximum(*ends)[usable]
         self._labels = labels
+        self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
         counts = np.bincount(self._label, minlength=int(labels.max(initial=-1)) + 1)
         # Position of each component's percentile among all edges, sorted by component and excess.
@@ -48,9 +49,13 @@ class LengthsFirst:
         starts = np.cumsum(counts) - counts
         self._places = (starts + np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64))[self._has_edges]
 
-    def mixed(self, held: Floats, free: Floats) -> Floats:
-        """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow."""
-        added = self._excess(held) - self._excess(free)
+    def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
+        """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
+
+        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse.
+        """
+        straight = (1.0 - time) * self._key0 + time * self._key1
+        added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
         part = _MOST_EXCESS / np.maximum(added, _MOST_EXCESS)
         return np.asarray(free + part[self._labels][:, None] * (held - free))
 

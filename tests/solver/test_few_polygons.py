@@ -14,6 +14,7 @@ from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.keys.embedding import Embedding
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.surface.path import SurfacePath
+from qc3d_addon.solver.triangles.topology import sides, unique_edges
 
 from .meshes import box_surface, enclosed_volume, icosphere, twisted
 
@@ -138,3 +139,19 @@ def test_volumes_are_held_where_the_straight_blend_is_worse_anyway() -> None:
     for shape, moment in zip(shapes_between(pair), TIMES, strict=True):
         wanted = (1.0 - moment) * ends[0] + moment * ends[1]
         assert enclosed_volume(shape, faces) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_what_is_flattened_is_no_worse_than_the_straight_blend() -> None:
+    points, faces = icosphere(3)
+    cup = faces[points[faces][:, :, 2].min(axis=1) > 0.35]
+    used, corners = np.unique(cup, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    cup_points = points[used] + 0.03 * np.sin(40.0 * points[used][:, :1]) * [0.0, 0.0, 1.0]
+    pair = KeyPair.checked(cup_points, cup_points * [1.0, 1.0, 0.02], corners)
+    edges = unique_edges(sides(corners))
+    lengths = [np.linalg.norm(np.diff(shape[edges], axis=1)[:, 0], axis=1) for shape in (pair.key0, pair.key1)]
+    scale = Embedding.of(pair).scale
+    for shape in shapes_between(pair):
+        length = np.linalg.norm(np.diff(shape[edges], axis=1)[:, 0], axis=1) / scale
+        excess = np.maximum(length / np.maximum(*lengths) - 1.0, 1.0 - length / np.minimum(*lengths))
+        assert np.percentile(excess, 99) < 0.0025

@@ -13,6 +13,7 @@ from bpy.props import BoolProperty
 from .. import live_scrub
 from ..bake.plan import Plan, plan_bake, request_again, write_bake
 from ..bake.together import objects_with_keys, plan_together, write_together
+from ..kinds import present
 from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
 from ..store import checks
 from .child_work import ChildWork
@@ -91,7 +92,7 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
         active = checks.require_object(context.active_object)
         fill_from_panel(self.properties, settings_of(active))
         request = bake_request(self)
-        others = [obj for obj in context.selected_objects if obj != active and obj.type == 'MESH']
+        others = [obj for obj in present(context.selected_objects) if obj != active and obj.type == 'MESH']
         chosen = objects_with_keys(active, others, request.keys)
         self._left_out = [obj.name for obj in others if obj not in chosen]
         self._joint = plan_together(chosen, request)

@@ -56,7 +56,7 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             every.operator_context = IN_THE_SIDEBAR
             every.operator(QC3D_OT_bake_keys.bl_idname, text="Selected Keys").which = "selected"
             every.operator(QC3D_OT_bake_keys.bl_idname, text="All Keys").which = "all"
-            if len(context.selected_objects) > 1:
+            if len(present(context.selected_objects)) > 1:
                 together = layout.column()
                 together.operator_context = IN_THE_SIDEBAR
                 together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')

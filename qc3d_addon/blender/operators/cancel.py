@@ -11,7 +11,7 @@ from .common import Status
 
 
 class QC3D_OT_cancel(bpy.types.Operator):
-    """Stop the work that is running; nothing is changed"""
+    """Stop the work that is running; nothing is changed. Esc does so with the mouse here or over the status bar"""
 
     bl_idname = "qc3d.cancel"
     bl_label = "Cancel"

@@ -29,7 +29,8 @@ class ChildWork(OperatorMixin):
 
     One that has several plans names the next by ``following``, and writes all by ``write_all``.
 
-    From a button it is a modal operator that Esc ends; called by a script, or without a window, it runs to its end.
+    From a button it is a modal operator, which Esc ends with the mouse over the progress. Called by a script, or without a
+    window, it runs to its end.
     Nothing is written unless all of the work was done.
     """
 
@@ -102,7 +103,8 @@ class ChildWork(OperatorMixin):
         return self._guarded(context, lambda: self._begin(context, self.plan(context)))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
-        if event.type == 'ESC' and event.value == 'PRESS':
+        is_escape = event.type == 'ESC' and event.value == 'PRESS'
+        if is_escape and progress_bar.is_at(present(context.window), event.mouse_x, event.mouse_y):
             jobs.cancel()
         if self._job.is_cancelled:
             self.report({'INFO'}, f"{self.bl_label} was cancelled; nothing was changed.")

@@ -29,8 +29,8 @@ class ChildWork(OperatorMixin):
 
     One that has several plans names the next by ``following``, and writes all by ``write_all``.
 
-    From a button it is a modal operator, which Esc ends with the mouse over the progress. Called by a script, or without a
-    window, it runs to its end.
+    From a button it is a modal operator, which Esc ends with the mouse over the progress. Called by a script, or
+    without a window, it runs to its end.
     Nothing is written unless all of the work was done.
     """
 

@@ -11,7 +11,7 @@ from ..operators.bake_keys import QC3D_OT_bake_keys
 
 
 def _draw_keys(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """In the menu beside the list of shape keys: bake those that are selected, or all."""
+    """Entries of the menu beside the list of shape keys: bake the selected keys, or all."""
     layout = present(menu.layout)
     layout.separator()
     layout.operator(
@@ -26,5 +26,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the entries away."""
+    """Remove the entries."""
     bpy.types.MESH_MT_shape_key_context_menu.remove(_draw_keys)  # type: ignore[arg-type,unused-ignore]  # 5.2's: no menu

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of the panel's choices: everything but what belongs to one character and shot."""
+"""Presets of the panel's options: all but those that belong to one character or shot."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FOLDER = "qc3d"
 
 
 class QC3D_MT_presets(bpy.types.Menu):
-    """The saved choices."""
+    """The menu of saved presets."""
 
     bl_label = "Presets"
     preset_subdir = FOLDER
@@ -39,7 +39,7 @@ class QC3D_MT_presets(bpy.types.Menu):
 
 
 class QC3D_OT_add_preset(AddPresetBase, bpy.types.Operator):  # type: ignore[misc]  # the first has no types
-    """Save the panel's choices under a name, or remove the preset of that name"""
+    """Save the panel's options as a preset, or remove the preset of that name"""
 
     bl_idname = "qc3d.add_preset"
     bl_label = "Add QC3D Preset"
@@ -57,7 +57,7 @@ class QC3D_OT_add_preset(AddPresetBase, bpy.types.Operator):  # type: ignore[mis
 
 
 def draw(layout: bpy.types.UILayout) -> None:
-    """The menu with a button to add the present choices and one to remove the preset that is shown."""
+    """The menu, with one button that saves the present options and one that removes the shown preset."""
     row = layout.row(align=True)
     row.menu(QC3D_MT_presets.__name__, text=QC3D_MT_presets.bl_label)
     row.operator(QC3D_OT_add_preset.bl_idname, text="", icon='ADD')

@@ -77,7 +77,7 @@ def why_unusable(data: bytes) -> str | None:
 
     Returns
     -------
-    The end of a sentence about the stored map: "is damaged", or by which version it was stored.
+    The end of a sentence about the stored map: "is damaged", or which version made it.
     """
     if not _is_whole(data):
         return "is damaged"
@@ -89,7 +89,7 @@ def why_unusable(data: bytes) -> str | None:
         return "is damaged"
     if version == FORMAT_VERSION:
         return None
-    return f"was stored by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
+    return f"was made by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
 
 
 def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:

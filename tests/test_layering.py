@@ -39,7 +39,7 @@ BLENDER_FLOORS = (
     ("heat_map",),
     ("bake",),
     ("chains", "live_scrub", "properties"),
-    ("exports",),
+    ("combinations", "exports"),
     ("operators",),
     ("ui",),
     ("cli",),

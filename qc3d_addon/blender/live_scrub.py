@@ -50,8 +50,9 @@ _suspended: _Scrub | None = None  # while the file is saved
 
 def is_on(obj: bpy.types.Object | None, slider_name: str = "") -> bool:
     """Whether the preview is on for an object, and for the slider if one is named."""
-    on_object = _scrub is not None and obj is not None and _scrub.plan.object_id == obj.session_uid
-    return on_object and (not slider_name or _scrub.chain.slider == slider_name)  # type: ignore[union-attr]
+    if _scrub is None or obj is None or _scrub.plan.object_id != obj.session_uid:
+        return False
+    return not slider_name or _scrub.chain.slider == slider_name
 
 
 def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:

@@ -12,7 +12,7 @@ from ..worker import engines
 from . import cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -23,6 +23,7 @@ from .operators.chains import (
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
+from .operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, QC3D_OT_remove_combination
 from .operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
@@ -30,7 +31,8 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_ke
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
-from .ui import menus, panel_exports, panel_results, panels, presets
+from .operators.split_key import QC3D_OT_split_key
+from .ui import menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
     properties.InnerKey,  # before the settings that contain it
@@ -40,6 +42,8 @@ CLASSES = (
     QC3D_OT_bake_inbetweens,
     KeyChoice,
     QC3D_OT_bake_keys,
+    QC3D_OT_bake_objects,
+    QC3D_OT_split_key,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
@@ -52,6 +56,9 @@ CLASSES = (
     QC3D_OT_mirror,
     QC3D_OT_export_alembic,
     QC3D_OT_export_in_betweens,
+    QC3D_OT_combine_keys,
+    QC3D_OT_judge_pairs,
+    QC3D_OT_remove_combination,
     QC3D_OT_read_usd,
     QC3D_OT_save_map,
     QC3D_OT_load_map,
@@ -62,6 +69,7 @@ CLASSES = (
     presets.QC3D_OT_add_preset,
     panels.QC3D_PT_inbetweens,
     panel_results.QC3D_PT_results,  # after its parent
+    panel_combinations.QC3D_PT_combinations,
     panel_exports.QC3D_PT_exports,
 )
 

@@ -40,6 +40,7 @@ __all__ = [
     "QC3DError",
     "Verdict",
     "bake",
+    "bake_together",
     "combine",
     "fit",
     "judge_pairs",
@@ -334,3 +335,43 @@ def judge_pairs(
         If the keys cannot be used.
     """
     return verdicts(KeysOnBase(base, keys, faces, edges), pairs)
+
+
+def bake_together(
+    meshes: Sequence[tuple[Sequence[ArrayLike], ArrayLike]],
+    frames: int | ArrayLike = 5,
+    *,
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    progress: OnProgress | None = None,
+    **options: Unpack[FitChoices],
+) -> list[Bake]:
+    """Frames of several meshes of one character in one map: what coincides in all keys stays together.
+
+    Parameters
+    ----------
+    meshes : sequence of (keys, faces)
+        Of each mesh its keys, (n, 3) each and equally many for all, in coordinates that all share, and its triangles.
+    frames, mode, easing, progress, **options
+        See ``bake``.
+
+    Returns
+    -------
+    list of Bake
+        Of each mesh. Notes, crossings and folds are those of all together.
+
+    Raises
+    ------
+    QC3DError
+        As ``bake``.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> bakes = qc3d.bake_together([([corners, 2.0 * corners], faces), ([-corners, corners], faces[:1])], frames=1)
+    >>> [bake.frames.shape for bake in bakes]
+    [(3, 4, 3), (3, 4, 3)]
+    """
+    return steps.bake_together(meshes, frames, mode=mode, easing=easing, **options).run(progress)

@@ -29,6 +29,7 @@ from .fit.fitted_map import FittedMap
 from .frames import task as tasks
 from .frames.bake import Bake, evenly_spaced
 from .frames.task import Outcome, Task
+from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
 from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
@@ -133,6 +134,37 @@ def combine(
 ) -> Work[Combination]:
     """The combination of several keys, step by step; see :func:`.api.combine` for the parameters."""
     return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
+
+
+def bake_together(
+    meshes: Sequence[tuple[Sequence[ArrayLike], ArrayLike]],
+    frames: int | ArrayLike = 5,
+    *,
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    **options: Unpack[FitChoices],
+) -> Work[list[Bake]]:
+    """The frames of several meshes in one map, step by step; see :func:`.api.bake_together` for the parameters."""
+    counts = sorted({len(keys) for keys, _ in meshes})
+    if len(counts) != 1 or counts[0] < 2:
+        raise InputError(f"The meshes have {', '.join(map(str, counts)) or 'no'} keys; all need the same two or more.")
+    through = tuple(f"key {number}" for number in range(counts[0]))
+    placed = [
+        PlacedMesh(consecutive_pairs(dict(zip(through, keys, strict=True)), faces, None, through), np.eye(4))
+        for keys, faces in meshes
+    ]
+    together, frame_options = Together(placed), FrameOptions(mode, easing)
+    times = times_of(frames, len(through) - 1)
+    task = Task(together.pairs, through, FitOptions(**options), frame_options, times)
+    task.require_memory(machine_limit_mb())
+    return Work(_apart(tasks.carry_out(task), together, frame_options, through))
+
+
+def _apart(
+    steps: Steps[Outcome], together: Together, options: FrameOptions, through: Sequence[str]
+) -> Steps[list[Bake]]:
+    bake = yield from _bake_of(steps)
+    return together.apart(bake, options, through)
 
 
 def times_of(frames: int | ArrayLike, pairs: int = 1) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from ...solver.errors import InputError, QC3DError
 from ..keys import chain_keys
 from ..kinds import keys_of
-from ..store import checks
+from ..store import checks, combined_keys
 from ..store.records import Record
 from ..store.renames import digest
 from .plan import Plan, plan_bake, write_bake
@@ -64,6 +64,7 @@ def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
     """
     keys = keys_of(checks.require_object(obj))
     made = {key.name for chain in Record.read(keys).chains for key in chain_keys.owned_keys(keys, chain).values()}
+    made |= combined_keys.names_made(keys)
     return [key.name for key in keys.key_blocks if key != keys.reference_key and key.name not in made]
 
 

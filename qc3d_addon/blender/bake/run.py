@@ -19,6 +19,7 @@ from ..store import checks
 from .many import Verdict, bake_keys, bakeable_keys
 from .plan import Plan, plan_bake, write_bake
 from .request import BakeRequest, BakeResult
+from .together import plan_together, write_together
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -54,6 +55,33 @@ def bake_object(
     return write_bake(plan, finish(carry_out(plan.task), on_progress))
 
 
+def bake_objects_together(
+    objects: Sequence[bpy.types.Object],
+    request: BakeRequest,
+    one_control: bool = True,
+    on_progress: OnProgress | None = None,
+) -> list[BakeResult]:
+    """Make the in-betweens of several objects of one character in one map, in this process.
+
+    Parameters
+    ----------
+    one_control
+        Whether what plays those of the first object drives the others.
+
+    Raises
+    ------
+    QC3DError
+        If an object, the keys or the settings cannot be used; all are as they were.
+    """
+    from ...solver.frames.task import carry_out
+    from ...solver.support.memory import machine_limit_mb
+    from ...solver.support.progress import finish
+
+    plan = plan_together(objects, request)
+    plan.task.require_memory(machine_limit_mb())
+    return write_together(plan, finish(carry_out(plan.task), on_progress), one_control)
+
+
 def bake_object_keys(
     obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, on_progress: OnProgress | None = None
 ) -> list[Verdict]:
@@ -85,7 +113,7 @@ def bake_object_keys(
 def bake_file(
     path: Path,
     object_names: Sequence[str],
-    work: Callable[[bpy.types.Object], tuple[Result, object]],
+    work: Callable[[Sequence[bpy.types.Object]], list[tuple[Result, object]]],
     output: Path,
     report: Path | None = None,
 ) -> list[Result]:
@@ -100,7 +128,7 @@ def bake_file(
     object_names
         Names of the objects to bake; empty for all meshes with two shape keys or more.
     work
-        Bakes one object; returns its result and its report, as plain values.
+        Bakes them; returns for each its result and its report, as plain values.
     output
         The .blend file to write; it may be the same as ``path``.
     report
@@ -119,7 +147,7 @@ def bake_file(
     _open(path)
     size = path.stat().st_size
     objects = _objects(path, object_names)
-    done = {obj.name: work(obj) for obj in objects}
+    done = dict(zip([obj.name for obj in objects], work(objects), strict=True))
     told = [values for _, values in done.values()]
     values = told[0] if len(object_names) == 1 else dict(zip(done, told, strict=True))
     # Beside their places: Blender writes the paths of images and libraries relative to the file's own folder.

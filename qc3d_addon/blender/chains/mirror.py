@@ -14,41 +14,40 @@ from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import chain_keys, shape_keys
 from ..keys.sculpted import Sculpted
-from ..kinds import keys_of, mesh_of
+from ..kinds import keys_of
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
+from .mirror_image import MirrorImage, mirror_image
 
 _SAME = 1e-4  # relative to the size: other tools round when they mirror keys
 
 
-def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
+def mirror_chain(
+    obj: bpy.types.Object, record: Record, chain: Chain, use_topology: bool = False
+) -> tuple[Chain, list[str]]:
     """Make the mirror image of a chain with its own keys, or update the one made before.
 
     If a key's value plays the chain, the value of the mirrored key plays the mirror image; otherwise a slider does.
-    Every vertex follows the mirror image of its partner, bit for bit. The sides in the keys' names, such as ".L", are
-    flipped; names without a side get the suffix "_mirrored".
+    Every vertex follows the mirror image of its partner, bit for bit if the Basis is exactly symmetric. Vertices
+    without a partner move like their surroundings on the other side; a returned sentence says so. The sides in the
+    keys' names, such as ".L", are flipped; names without a side get the suffix "_mirrored".
 
     Raises
     ------
     InputError
-        If the Basis is not symmetric across x = 0, the chain is itself a mirror image, the other side was baked from
-        its own keys, or keys cannot be written; nothing is changed then.
+        If the Basis is not nearly symmetric across x = 0, the chain is itself a mirror image, the other side was baked
+        from its own keys, or keys cannot be written; nothing is changed then.
     """
-    from ...solver.triangles.mirror_symmetry import mirror_partners
-
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is itself the mirror image of '{chain.mirror_of}'; choose that one.")
     keys = keys_of(obj)
     steps = chain_keys.all_owned_keys(keys, chain)
     base = chain_keys.base_key(keys, chain).name
-    rest = key_coordinates(obj, keys.reference_key.name)
-    ends = np.empty(2 * len(mesh_of(obj).edges), dtype=np.int32)
-    mesh_of(obj).edges.foreach_get("vertices", ends)
-    partners = mirror_partners(rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64))
-    flipped = np.array([-1.0, 1.0, 1.0], dtype=np.float32)
-    shapes = {step: key_coordinates(obj, key.name)[partners] * flipped for step, key in steps.items()}
+    image = mirror_image(obj, use_topology)
+    partners = image.partners
+    shapes = {step: image.of(key_coordinates(obj, key.name)) for step, key in steps.items()}
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
     if through == chain.through:
@@ -57,8 +56,8 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         through = (*through[:-1], f"{through[-1]}_mirrored")
     on_key = through[-1] if chain.on_key else ""
     if on_key:
-        shape = key_coordinates(obj, chain.on_key)[partners] * flipped
-        _require_mirror_image(obj, on_key, shape, base)
+        shape = image.of(key_coordinates(obj, chain.on_key))
+        _require_mirror_image(obj, on_key, shape, base, image)
     mirrored = record.chain_on_key(on_key) if on_key else record.chain(through)
     if mirrored is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
@@ -79,16 +78,19 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
         bookkeeping.remember(obj, record, mirrored, measures, made, undo)
-    return mirrored
+    return mirrored, image.note()
 
 
-def _require_mirror_image(obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str) -> None:
+def _require_mirror_image(
+    obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str, image: MirrorImage
+) -> None:
     """Raise InputError unless the key of that name has this shape and is relative to ``base``."""
     key = keys_of(obj).key_blocks.get(name)
     if key is None:
         raise InputError(f"There is no key '{name}' for the mirror image; mirror the key first.")
     size = float(np.ptp(shape, axis=0).max())
-    if key.relative_key.name != base or np.abs(key_coordinates(obj, name) - shape).max() > _SAME * size:
+    missed = np.abs(key_coordinates(obj, name) - shape)[image.has_partner]
+    if key.relative_key.name != base or missed.max() > _SAME * size:
         raise InputError(f"'{name}' is not the mirror image of the other side's key; bake it by itself.")
 
 

@@ -53,6 +53,8 @@ def remove_slider(control: Control, chain: Chain) -> list[str]:
         return [f"The slider '{chain.slider}' stays, since {readers} {what} it."]
     path = control.path
     notes = []
+    if owner.animation_data is not None and owner.animation_data.drivers.find(path) is not None:
+        owner.driver_remove(path)  # it kept the slider where that of another object is
     if compat.find_fcurve(owner, path) is not None:
         if chain.keyframes is not None:
             compat.remove_fcurve(owner, path)

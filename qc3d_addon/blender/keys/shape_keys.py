@@ -144,7 +144,7 @@ def chain_written(
             undo.callback(setattr, key, "relative_key", key.relative_key)
             key.relative_key = base  # another one may have been moved to the top
         for step in sorted(shapes.keys() - kept.keys()):
-            written[step] = _new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
+            written[step] = new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
             if control.is_key:
@@ -217,7 +217,8 @@ def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
     _activate(obj, active)
 
 
-def _new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: ExitStack) -> bpy.types.ShapeKey:
+def new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: ExitStack) -> bpy.types.ShapeKey:
+    """A key relative to another one, at 0, whose value may leave 0 to 1; closing ``undo`` removes it."""
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)
     key.value = 0.0  # Blender 5 starts with 1

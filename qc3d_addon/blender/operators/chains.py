@@ -145,15 +145,25 @@ class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
     bl_idname = "qc3d.mirror"
     bl_label = "Mirror"
 
-    slider: SLIDER
+    if TYPE_CHECKING:
+        slider: SLIDER
+        use_topology: bool
+    else:
+        slider: SLIDER
+        use_topology: BoolProperty(
+            name="Topology",
+            description="Find the mirror images of vertices also by how the mesh is built, where places do not tell",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        mirrored = mirror.mirror_chain(obj, record, chain)
-        return [f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
+        mirrored, notes = mirror.mirror_chain(obj, record, chain, self.use_topology)
+        return [*notes, f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
 
 
 class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):

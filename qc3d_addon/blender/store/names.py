@@ -44,6 +44,14 @@ def key_name(label: str, step: int, places: Sequence[float]) -> str:
     return f"{label}_{whole:02d}_{tenths}"
 
 
+def combination_name(keys: Sequence[str], places: Sequence[float]) -> str:
+    """The name of the shape key that corrects keys that are on at once, by their values: "Jaw_Smile_50_100"."""
+    ending = "".join(f"_{round(100.0 * place)}" for place in places)
+    room = LIMIT - len(".001") - _size(ending) - (len(keys) - 1)
+    parts = [_shorten(key, room // len(keys)) for key in keys]
+    return "_".join(parts) + ending
+
+
 def _join(keys: Sequence[str], room: int) -> str:
     if _size(BETWEEN.join(keys)) > room and room // len(keys) < _LEAST_ROOM + _size(BETWEEN):
         keys = [keys[0], LEFT_OUT, keys[-1]]

@@ -8,16 +8,18 @@ import bpy
 
 from ..kinds import present
 from ..operators.bake_keys import QC3D_OT_bake_keys
+from ..operators.split_key import QC3D_OT_split_key
 
 
 def _draw_keys(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """Entries of the menu beside the list of shape keys: bake the selected keys, or all."""
+    """Entries of the menu beside the list of shape keys: bake the selected keys, or all; split one."""
     layout = present(menu.layout)
     layout.separator()
     layout.operator(
         QC3D_OT_bake_keys.bl_idname, text="Bake In-Betweens of Selected Keys", icon='SHAPEKEY_DATA'
     ).which = "selected"
     layout.operator(QC3D_OT_bake_keys.bl_idname, text="Bake In-Betweens of All Keys").which = "all"
+    layout.operator(QC3D_OT_split_key.bl_idname)
 
 
 def register() -> None:

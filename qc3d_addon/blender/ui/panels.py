@@ -11,7 +11,7 @@ import bpy
 from ...worker import engines
 from ..bake import jobs, progress_bar
 from ..kinds import keys_of, present
-from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
 from ..operators.cancel import QC3D_OT_cancel
 from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
@@ -56,6 +56,10 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             every.operator_context = IN_THE_SIDEBAR
             every.operator(QC3D_OT_bake_keys.bl_idname, text="Selected Keys").which = "selected"
             every.operator(QC3D_OT_bake_keys.bl_idname, text="All Keys").which = "all"
+            if len(context.selected_objects) > 1:
+                together = layout.column()
+                together.operator_context = IN_THE_SIDEBAR
+                together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')
         if problem is not None:
             draw_sentence(context, layout, problem)
             return

@@ -93,7 +93,7 @@ def test_refused() -> None:
         Together([])
     with pytest.raises(InputError, match="other names"):
         Together([PlacedMesh(pairs, np.eye(4)), PlacedMesh({("a", "b"): pairs[ENDS]}, np.eye(4))])
-    with pytest.raises(InputError, match="no size along an axis"):
+    with pytest.raises(InputError, match="has the scale 0 along an axis"):
         Together([PlacedMesh(pairs, np.diag([1.0, 0.0, 1.0, 1.0]))])
     with pytest.raises(InputError, match="all need the same two or more"):
         qc3d.bake_together([([BODY], FACES)])

@@ -60,6 +60,7 @@ _DESCRIPTIONS = {
         "normal": "Enough for in-betweens",
         "fine": "Twice as many tetrahedra: for heat maps of volume and dilatation, and for mode Linear",
         "finest": "Four times as many tetrahedra; slow",
+        "exact": "As fine as the mesh itself, so that the map meets both keys; slowest. For heat maps and mode Linear",
     },
 }
 _OPTIONS = (FitOptions, FrameOptions, PlayOptions)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
-    """Fill in the frames between two shape keys or more, as new shape keys that one slider plays"""
+    """Fill in the frames between two or more shape keys: new shape keys, all played by one slider or key"""
 
     bl_idname = "qc3d.bake_inbetweens"
     bl_label = "Bake In-Betweens"
@@ -47,7 +47,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
 
 
 class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
-    """Bake in-betweens again after their keys were sculpted, with the same choices; slider and drivers stay"""
+    """Bake these in-betweens again with the same options, after their keys were sculpted; slider and drivers stay"""
 
     bl_idname = "qc3d.rebake"
     bl_label = "Re-Bake"

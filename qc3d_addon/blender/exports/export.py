@@ -162,8 +162,8 @@ def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArr
 def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
     """(k,) the values of the object's shape keys now.
 
-    Blender's threads now and then evaluate a driver before the one that it reads, one time in a thousand on a machine
-    with much to do: two evaluations that agree are right.
+    Where drivers of the user move other things of the keys than their values, Blender's threads may write values of the
+    frame before back, one time in a thousand on a machine with much to do: two evaluations that agree are right.
     """
     found = _values(obj)
     for _ in range(_MOST_EVALUATIONS):

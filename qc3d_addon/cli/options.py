@@ -24,7 +24,11 @@ _HELP = {
     "quality": "how fine the volume is",
     "extra_turns": "full turns that two shapes cannot tell",
     "seed": "of the delaunay engine's samples",
+    "sampling": "samples of the delaunay engine: graded, or the paper's",
+    "threshold": "of the paper's sampling: radii beside the surface that are thinned",
+    "sparsity": "of the paper's sampling: how fast samples get fewer away from the surface",
 }
+_NUMBERS = ("threshold", "sparsity")
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
 
@@ -40,8 +44,12 @@ def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | Fram
                 f"--{name.replace('_', '-')}",
                 default=default,
                 help=f"{_HELP[name]} (default: {default})",
-                **({"choices": choices} if choices else {"type": whole_number, "metavar": _METAVARS[name]}),
+                **({"choices": choices} if choices else _number_of(name)),
             )
+
+
+def _number_of(name: str) -> dict[str, Any]:
+    return {"type": float, "metavar": "X"} if name in _NUMBERS else {"type": whole_number, "metavar": _METAVARS[name]}
 
 
 def fit_options(arguments: argparse.Namespace) -> FitOptions:

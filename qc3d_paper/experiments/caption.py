@@ -8,6 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table, with what comes before and after it kept apart."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n\n" + "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n\n"
+
+
 @dataclass(frozen=True)
 class Caption:
     """The caption of one figure.

@@ -26,6 +26,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 
 BIJECTIONS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
     "3": ("every coordinate stretched by itself", shapes.along_axes),
@@ -52,6 +53,7 @@ def draw(number: str, title: str, mapping: Mapping, file: BinaryIO) -> Caption:
     draw_open_cube(panels[0, 2], mesh, rebuilt.values)
     panels[0, 2].set_title("rebuilt: the planes z = ¼, ½, ¾")
     panels[1, 2].hist(np.log10(np.maximum(error, 1e-17)), 40, color="0.4")
+    panels[1, 2].xaxis.set_major_locator(MaxNLocator(5))
     panels[1, 2].set_xlabel("error of a vertex, log₁₀ of cube sides")
     panels[1, 2].set_ylabel("vertices")
     panels[1, 2].set_title("distance of rebuilt from target")

@@ -42,5 +42,5 @@ class Caption:
         """Markdown of the figure, whose picture is in the same folder, and its caption."""
         return (
             f"## Figure {self.figures}: {self.title}\n\n![{self.title}]({picture.name})\n\n"
-            f"**The paper claims:** {self.claim}\n\n**Measured:** {self.measured}\n\n**Holds?** {self.holds}\n"
+            f"**The paper claims:** {self.claim}\n\n**Measured:** {self.measured.rstrip()}\n\n**Holds?** {self.holds}\n"
         )

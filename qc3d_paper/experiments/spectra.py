@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import BinaryIO
 
 import matplotlib
@@ -21,6 +22,7 @@ from matplotlib.axes import Axes
 
 _SHOWN = 60  # modes of the representation in the pictures of the cube
 _COUNTS = (1, 2, 4, 8, 16, 30, 60, 120, 240, 500, 1000, 2000)
+_NARROW = 34  # characters of a line in a figure
 _WINDOW = 15  # modes in the moving average of the spectra
 _CHANNELS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _LINES: dict[Way, str] = {
@@ -64,7 +66,7 @@ def draw_cubes(number: str, experiments: list[Experiment], file: BinaryIO) -> Ca
             draw_cube(panels[2 * row, column], experiment.mesh, values)
             draw_open_cube(panels[2 * row + 1, column], experiment.mesh, values)
             panels[2 * row, column].set_title(title)
-        panels[2 * row, 0].set_ylabel(f"{experiment.title}\nboundary")
+        panels[2 * row, 0].set_ylabel(f"{_narrow(experiment.title)}\nboundary")
         panels[2 * row + 1, 0].set_ylabel("inside: the planes z = ¼, ½, ¾")
         measured: list[tuple[Way, int]] = [
             ("coordinates", few),
@@ -133,7 +135,7 @@ def draw_spectrum(number: str, experiments: list[Experiment], file: BinaryIO) ->
             axes.set_title(name)
             axes.set_xlabel("mode")
         panels[row, 0].set_ylim(max(sizes[1:].max() * 1e-4, 1e-12), sizes.max() * 2.0)
-        panels[row, 0].set_ylabel(f"{experiment.title}\nsize of the coefficient")
+        panels[row, 0].set_ylabel(f"{_narrow(experiment.title)}\nsize of the coefficient")
         weights = np.where([name[0] == name[1] for name in _CHANNELS], 1.0, 2.0)
         energy = (sizes[1:] ** 2) @ weights
         tenth = max(1, len(energy) // 10)
@@ -177,7 +179,7 @@ def draw_errors(number: str, experiments: list[Experiment], file: BinaryIO) -> C
             axes.axhline(1.0, color="0.4", linewidth=1.0, label="source to target")
             axes.axhline(transfer, color="C1", linestyle=":", label="published, transfer alone")
             axes.set_xlabel(label)
-            axes.set_title(f"{experiment.title}: by {label}", fontsize=10)
+            axes.set_title(f"{_narrow(experiment.title)}\nby {label}", fontsize=10)
         panels[row, 0].set_ylabel("mean square error, of that from source to target")
         panels[row, 0].set_ylim(1e-5, None)
         panels[row, 1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -218,6 +220,10 @@ def _draw_lines(axes: Axes, counts: dict[Way, list[int]], reached: dict[Way, lis
 def _at(counts: list[int], parts: list[float], count: int) -> float:
     """The value at a number of modes, between those that were computed by a power law."""
     return float(np.exp(np.interp(np.log(max(count, 1)), np.log(counts), np.log(np.maximum(parts, 1e-300)))))
+
+
+def _narrow(title: str) -> str:
+    return fill(title, _NARROW)
 
 
 def _overall(holds: list[bool]) -> str:

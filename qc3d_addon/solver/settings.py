@@ -14,7 +14,7 @@ Mode = Literal["natural", "linear", "straight"]
 Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Sampling = Literal["graded", "published"]
-Quality = Literal["normal", "fine", "finest"]
+Quality = Literal["normal", "fine", "finest", "exact"]
 StretchLaw = Literal["linear", "logarithmic"]
 Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
@@ -34,7 +34,8 @@ class FitOptions:
     engine
         What fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
     quality
-        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``.
+        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``; or ``exact``, with which they are as fine as
+        the surface, and the map meets both keys. That one is always filled by ``delaunay``.
     seed
         Seed of the random samples of the ``delaunay`` engine, 0 or more.
     stretch
@@ -88,13 +89,19 @@ class FitOptions:
         for value, name, most in ((self.threshold, "threshold", 10.0), (self.sparsity, "sparsity", 100.0)):
             if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= value <= most:
                 raise InputError(f"The {name} of the sampling is {value!r}; it must be a number from 0 to {most:g}.")
+        if self.quality == "exact" and self.engine == "tetwild":
+            raise InputError("The quality exact fills the volume by the engine delaunay; choose that, or auto.")
+        if self.sampling == "published" and (self.engine != "delaunay" or self.quality == "exact"):
+            raise InputError(
+                "The published sampling belongs to the engine delaunay and a quality other than exact; choose those."
+            )
         limit = self.mesh_time_limit
         if not isinstance(limit, Real) or isinstance(limit, bool) or not limit > 0.0:
             raise InputError(f"The time limit of meshing is {limit!r}; it must be a positive number of seconds.")
 
     @property
     def identity(self) -> str:
-        """The options as one text: fits with the same text can take each other's place."""
+        """The options as one string; fits with the same string are interchangeable."""
         text = f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
         return text if self.sampling == "graded" else f"{text} published {self.threshold} {self.sparsity}"
 
@@ -115,7 +122,7 @@ class FitChoices(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class FrameOptions:
-    """How frames are made from a fit; other frames of the same fit may use others.
+    """Options of frames; different frames of the same fit may use different ones.
 
     Parameters
     ----------
@@ -123,7 +130,7 @@ class FrameOptions:
         ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme (Chen & Lui, section 6.1),
         ``straight`` moves every vertex along a straight line and needs no fit.
     easing
-        How far along the way the in-betweens are: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
+        How the speed of the motion changes: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
 
     Raises
     ------
@@ -145,19 +152,19 @@ class FrameOptions:
 
 @dataclass(frozen=True)
 class PlayOptions:
-    """How a control is to play a motion through a few of its shapes.
+    """How a control plays a motion through a few of its shapes.
 
     Parameters
     ----------
-    count
-        Number of in-betweens between every two keys, even in the control's position; 1 or more.
-    tolerance
-        Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
-        help; ``count`` is then not looked at.
-    weights
+    count : int
+        Number of in-betweens between every two keys, evenly spaced in the control's position.
+    tolerance : float
+        If positive, as few in-betweens as play every moment within this distance, in the keys' unit, placed where they
+        help most; ``count`` is then ignored.
+    weights : WeightKind
         ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbors.
-    also_at
-        Positions of more in-betweens, each between 0 and 1.
+    also_at : tuple of float
+        Positions of additional in-betweens, between 0 and 1.
 
     Raises
     ------

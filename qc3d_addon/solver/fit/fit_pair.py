@@ -7,22 +7,28 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..arrays import Floats
 from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair, require_sizes
 from ..keys.orientation import require_reachable
 from ..meshing.cube import fill_cube
+from ..meshing.vertex_mesh import COARSE_SHARE
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
 from ..tets.point_location import interpolation_matrix
 from .continuation import follow_path, path_to
+from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
+from .meeting import MET, crossing_vertices, meet_keys
 
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
+_MOST_NAMED = 10  # vertices
 
 
 def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
@@ -50,10 +56,38 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
+    fitted = yield from (_meeting if options.quality == "exact" else _near)(embedding, options, seconds)
+    notes = [*fitted.notes]
+    turned = half_turned_parts(fitted.surface_path)
+    missed = fitted.landmark_residual().rms
+    if out_of_reach.parts:
+        notes.append(
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys{out_of_reach.where}, which "
+            "no motion of a volume can do. Mode straight may look as good."
+        )
+    elif missed > _LARGE_RESIDUAL:
+        other = " Where a part goes the wrong way round, choose other extra turns." if turned else ""
+        notes.append(
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
+            f"the second key crosses itself or is flattened. Mode straight may look as good.{other}"
+        )
+    if turned and not options.extra_turns:
+        notes.append(
+            f"{'A part turns' if turned == 1 else f'{turned} parts turn'} by half a turn, for which both ways are as "
+            "long; -1 as extra turns takes the other way."
+        )
+    if options.quality == "exact":
+        notes += _missed_notes(fitted)
+    return replace(fitted, notes=tuple(notes))
+
+
+def _near(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
+    """The map of a volume whose tetrahedra do not follow the vertices: it comes near the second key."""
+    faces = embedding.pair.faces
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, pair.faces, options)
+            filled = fill_cube(embedding.key0, faces, options)
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
@@ -65,8 +99,8 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
         fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
         followed = yield from staged("fit", follow_path(fitter, targets))
     yield Progress("fit", 1.0)
-    fitted = FittedMap(
-        pair,
+    return FittedMap(
+        embedding.pair,
         filled.mesh,
         followed.maps,
         followed.turns,
@@ -78,26 +112,45 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
         seconds,
         path,
     )
-    missed = fitted.landmark_residual().rms
-    if out_of_reach.parts:
-        note = (
-            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys, which no motion of a "
-            "volume can do. Mode straight may look as good."
-        )
-    elif missed > _LARGE_RESIDUAL:
-        note = (
-            f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
-            "the second key crosses itself or is flattened. Mode straight may look as good."
-        )
-    else:
-        return fitted
-    return replace(fitted, notes=(*filled.notes, note))
+
+
+def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
+    """The map that meets the second key."""
+    faces = embedding.pair.faces
+    yield Progress("mesh", 0.0)
+    with beside(partial(_way, embedding, options, seconds)) as way:
+        with timed(seconds, "mesh"):
+            coarse = fill_cube(embedding.key0, faces, options, COARSE_SHARE)
+            yield Progress("mesh", 0.1)
+            fine = fill_cube(embedding.key0, faces, options)
+        yield Progress("mesh", 1.0)
+        path, targets = way.result()
+    with timed(seconds, "fit"):
+        met = yield from staged("fit", meet_keys(embedding, coarse.mesh, fine.mesh, targets))
+    yield Progress("fit", 1.0)
+    return FittedMap(
+        embedding.pair, met.mesh, met.maps, met.turns, options, fine.engine, embedding, met.landmarks, (), seconds, path
+    )
+
+
+def _missed_notes(fitted: FittedMap) -> list[str]:
+    """A sentence about the vertices that a map which is to meet the second key misses, where there are any."""
+    missed = fitted.missed()
+    worst = np.argsort(-missed, kind="stable")[: np.count_nonzero(missed > MET)]
+    if not len(worst):
+        return []
+    crossing = np.count_nonzero(crossing_vertices(fitted.embedding)[worst])
+    named = ", ".join(str(vertex) for vertex in worst[:_MOST_NAMED]) + (", …" if len(worst) > _MOST_NAMED else "")
+    return [
+        f"The map meets {len(missed) - len(worst)} of {len(missed)} vertices to {MET:.2%} of the size, and misses "
+        f"{len(worst)}, {crossing} of them where a key crosses itself: {named}."
+    ]
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
     """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
-        path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
+        path = path_between(embedding, options)
         return path, path_to(path, embedding.key1)
 
 

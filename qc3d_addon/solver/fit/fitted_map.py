@@ -19,6 +19,7 @@ from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
 from ..triangles.winding_number import insideness, winding_numbers
+from .directions import path_between
 from .fold_free import FoldFreeFitter
 from .fold_repair import covered
 
@@ -107,7 +108,7 @@ class FittedMap:
     @cached_property
     def surface_path(self) -> SurfacePath:
         """The surface path between the keys; cached, because setting it up takes as long as several frames."""
-        return self.path or SurfacePath(self.embedding, self.options.stretch, self.options.extra_turns != 0)
+        return self.path or path_between(self.embedding, self.options)
 
     @cached_property
     def insideness(self) -> Floats:
@@ -139,9 +140,13 @@ class FittedMap:
         """Number of folds of a map (N, 3) at ``time`` that ``unfolded`` cannot remove."""
         return self.folds(self.unfolded(values, time)) if self.folds(values) else 0
 
-    def landmark_residual(self) -> Residual:
-        """The residual: distances of the mapped landmarks from the second key."""
+    def missed(self) -> Floats:
+        """(n,) how far the map leaves each vertex from the second key, over the bounding-box diagonal."""
         embedding = self.embedding
-        missed = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
-        missed /= self.pair.diagonal * embedding.scale
-        return Residual(float(np.sqrt(embedding.weights @ missed**2)), float(missed.max()))
+        distances = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
+        return np.asarray(distances / (self.pair.diagonal * embedding.scale))
+
+    def landmark_residual(self) -> Residual:
+        """Distance of the mapped landmarks from the second key."""
+        missed = self.missed()
+        return Residual(float(np.sqrt(self.embedding.weights @ missed**2)), float(missed.max()))

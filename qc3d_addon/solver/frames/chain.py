@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From keys and their fits to the frames of a chain, with a report."""
+"""The frames of a chain of keys, with a report."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..collision.colliders import CollisionResolver, PosedCollider
 from ..fit.fitted_map import FittedMap, Residual
+from ..fit.meeting import MET
 from ..keys.halves import held_on_planes
 from ..keys.keypair import KeyPair
 from ..settings import FrameOptions
@@ -23,7 +24,7 @@ from .easing import eased
 from .frame import Frame
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
-from .report import BakeReport, Folds, crossing_notes, mirror_notes, welding_notes
+from .report import BakeReport, Folds, crossing_notes, embedding_notes, mirror_notes, welding_notes
 
 
 def chain_frames(
@@ -33,7 +34,7 @@ def chain_frames(
     options: FrameOptions,
     collider: PosedCollider | None = None,
 ) -> Steps[Bake]:
-    """Frames through two keys or more in a row; the keys themselves, bit for bit, where the time is theirs.
+    """Compute the frames of a chain of two or more keys; at the time of a key, the frame is the key, bit for bit.
 
     Parameters
     ----------
@@ -85,6 +86,8 @@ def chain_frames(
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
     notes += mirror_notes(pairs[0]) + welding_notes(pairs) + crossing_notes(crossings, wanted)
+    if fits and fits[0].options.quality == "exact":
+        notes += embedding_notes([frame.certificate for frame in ordered if frame.certificate is not None], MET)
     notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",
@@ -117,9 +120,9 @@ def chain_frames(
 
 
 def _put_keys(made: dict[int, Frame], members: Ints, times: Floats, pair: KeyPair) -> float:
-    """Put the keys themselves at 0 and 1; returns how far the frames computed there were from them.
+    """Replace the frames at the times 0 and 1 by the keys; return the largest coordinate difference.
 
-    The frame at a key is the key: it crosses itself as often as that does.
+    Such a frame has no crossings beyond those of the key.
     """
     error = 0.0
     for index in members.tolist():

@@ -22,6 +22,7 @@ from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
 from .extra_turns import ExtraSpins
 from .frame import Frame
+from .loose_pieces import LoosePieces
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -124,6 +125,10 @@ class NaturalFrames:
             excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
+        if any(crossings):
+            embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
+            pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
+            positions, crossings = pieces.apart(self._limit, times, positions, crossings)
         if resolver is not None:
             positions = yield from self._cleared(resolver, times, volumes, positions)
             crossings = list(in_threads(self._limit.excess, positions))

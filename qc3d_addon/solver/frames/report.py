@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake tells about itself."""
+"""The report of a bake."""
 
 from __future__ import annotations
 
@@ -20,20 +20,25 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Certificate:
-    """The proof of one frame's map: all determinants of its Jacobians are positive where ``folds`` is 0.
+    """The certificate of one frame's map, which has no folds exactly if all determinants of its Jacobians are positive.
 
     Parameters
     ----------
-    time
+    time : float
         Time of the frame within its pair of keys, 0..1.
-    folds
-        Tetrahedra that the frame's map does not keep positively oriented.
-    smallest_determinant
-        The smallest determinant of the map's Jacobians.
-    place
+    folds : int
+        Number of tetrahedra that the frame's map inverts or flattens.
+    smallest_determinant : float
+        Smallest determinant of the map's Jacobians.
+    place : list of float
         Where that is: x, y, z in the keys' coordinates.
-    repaired
+    repaired : bool
         Whether folds of the interpolated map had to be removed.
+    missed
+        The largest distance of a vertex of the frame from where the map takes it, over the bounding-box diagonal. Where
+        it is nothing and there are no folds, the vertices are those of a surface that is proven not to cross itself
+        wherever the first key does not: the image of that key under the map. What is flat between the vertices is not
+        part of the proof; its crossings are counted.
     """
 
     time: float
@@ -41,11 +46,12 @@ class Certificate:
     smallest_determinant: float
     place: list[float]
     repaired: bool
+    missed: float
 
 
 @dataclass(frozen=True)
 class Folds:
-    """Folded tetrahedra: of the fitted maps together, and of each frame's map; None in mode ``straight``."""
+    """Numbers of folded tetrahedra: in all fitted maps, and in each frame's map; None in mode ``straight``."""
 
     map: int | None
     frames: list[int] | None
@@ -53,7 +59,7 @@ class Folds:
 
 @dataclass(frozen=True)
 class WorstStretch:
-    """The edge that leaves the interval between its lengths in the two keys farthest.
+    """The edge that is farthest outside the interval between its lengths in the two keys.
 
     Parameters
     ----------
@@ -110,7 +116,7 @@ class PlayedReport:
 
 @dataclass
 class BakeReport:
-    """Everything that a bake tells about itself.
+    """The report of a bake.
 
     Parameters
     ----------
@@ -226,6 +232,18 @@ def mirror_notes(pair: KeyPair) -> list[str]:
 
 def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
     return None if counts is None else [counts[index] for index in chosen]
+
+
+def embedding_notes(certificates: Sequence[Certificate], met: float) -> list[str]:
+    """A sentence about frames whose vertices are all within ``met`` of where a map without folds takes them."""
+    proven = sum(one.folds == 0 and one.missed <= met for one in certificates)
+    if not proven:
+        return []
+    return [
+        f"In {proven} of {len(certificates)} frames every vertex is within {met:.2%} of the size of where a map "
+        "without folds takes the first key: on a surface that is proven to cross itself nowhere where the key does "
+        "not. Crossings of the flat triangles between them are counted."
+    ]
 
 
 def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str = "itself") -> list[str]:

@@ -67,6 +67,8 @@ def test_it_fills_the_cube() -> None:
         ({"threshold": -1.0}, "The threshold of the sampling is -1.0; it must be a number from 0 to 10"),
         ({"threshold": float("nan")}, "The threshold of the sampling is nan"),
         ({"sparsity": 1e9}, "The sparsity of the sampling is 1000000000.0; it must be a number from 0 to 100"),
+        ({"sampling": "published", "engine": "auto"}, "belongs to the engine delaunay"),
+        ({"sampling": "published", "quality": "exact"}, "a quality other than exact"),
         ({"sparsity": "much"}, "The sparsity of the sampling is 'much'"),
     ],
 )

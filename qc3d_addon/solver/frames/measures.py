@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distortion of every frame at every vertex, against the first key of all."""
+"""Distortion of every frame at every vertex, relative to the first key of the chain."""
 
 from __future__ import annotations
 
@@ -19,10 +19,8 @@ from ..support.threads import in_threads
 from ..triangles.topology import sides, unique_edges
 from .report import WorstStretch
 
-# Ratios beyond this say no more than that something is flat.
-_MOST = 1e6
-# Edges below this part of the size have no length to speak of.
-_SHORTEST = 1e-6
+_MOST = 1e6  # larger ratios only say that something is flat
+_SHORTEST = 1e-6  # of the diagonal; a relative length of shorter edges means little
 
 
 def measure(

@@ -46,7 +46,7 @@ _found: dict[int, list[PairVerdict]] = {}
 def judge(obj: bpy.types.Object | None) -> Iterator[float]:
     """Judge every pair of the object's keys with the same base; yields the fraction that is done.
 
-    Generated keys are skipped. ``found`` returns the verdicts afterwards.
+    Generated keys are skipped. ``found`` returns the verdicts afterward.
 
     Raises
     ------

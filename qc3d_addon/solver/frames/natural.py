@@ -22,6 +22,7 @@ from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
 from .extra_turns import ExtraSpins
 from .frame import Frame
+from .placement import Placement, Placer
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -53,6 +54,7 @@ class NaturalFrames:
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
+        self._placer = Placer(embedding, fitted.options.extra_turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
@@ -91,14 +93,18 @@ class NaturalFrames:
             spins[1], second.strain, volume * second.growth
         )
 
-    def with_end_rates(self, first: Rates, second: Rates) -> NaturalFrames:
-        """The same in-betweens with other rates at the two keys, in the keys' own coordinates."""
+    def with_end_rates(self, first: Rates, second: Rates, inner: tuple[bool, bool]) -> NaturalFrames:
+        """The same in-betweens with other rates at the two keys, in the keys' own coordinates.
+
+        ``inner`` tells which of the two lies between this pair and another one.
+        """
         motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**3
         spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
         changed = copy.copy(self)
         changed._surface = self._surface.with_end_rates(
             Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)
         )
+        changed._placer = self._placer.beside(inner)
         return changed
 
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
@@ -109,7 +115,8 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
-        return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
+        shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
+        return self._finished(shape, time, self._placer.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
@@ -124,15 +131,16 @@ class NaturalFrames:
             excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
+        placements = [self._placer.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
         if resolver is not None:
-            positions = yield from self._cleared(resolver, times, volumes, positions)
+            positions = yield from self._cleared(resolver, times, volumes, positions, placements)
             crossings = list(in_threads(self._limit.excess, positions))
-        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
+        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, placements, crossings, strict=True))
         return list(made)
 
-    def _certified(self, moment: tuple[float, Floats, Floats, int | None]) -> Frame:
-        """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
-        time, values, positions, crossings = moment
+    def _certified(self, moment: tuple[float, Floats, Floats, Placement, int | None]) -> Frame:
+        """The frame of a time, its map's values, its surface in the cube, where it goes and its excess of crossings."""
+        time, values, shape, placement, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
         found = self._volume.followed(time, values)
         repaired = self._fitted.folds(found) > 0
@@ -140,7 +148,8 @@ class NaturalFrames:
             found, repaired = values, False
         if repaired:
             found = self._fitted.unfolded(found, time)
-        return Frame.of(self._fitted, self._placed(positions, time), found, time, repaired, crossings)
+        positions = self._finished(shape, time, placement)
+        return Frame.of(self._fitted, positions, found, time, repaired, crossings, placement)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
         """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
@@ -148,10 +157,10 @@ class NaturalFrames:
         shapes = self._shaped(self._surface, self._moments(maps, times))
         return maps, shapes, [self._limit.excess(shape) for shape in shapes]
 
-    def _placed(self, shape: Floats, time: float) -> Floats:
-        """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
+    def _finished(self, shape: Floats, time: float, placement: Placement) -> Floats:
+        """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._fitted.embedding.from_cube(shape, time)
+        positions = self._fitted.embedding.from_cube(placement.apply(shape), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -199,7 +208,12 @@ class NaturalFrames:
         return positions, excess
 
     def _cleared(
-        self, resolver: CollisionResolver, times: Floats, volumes: list[Floats], positions: list[Floats]
+        self,
+        resolver: CollisionResolver,
+        times: Floats,
+        volumes: list[Floats],
+        positions: list[Floats],
+        placements: list[Placement],
     ) -> Generator[float, None, list[Floats]]:
         """Push vertices out of the colliders and let the surface around give way, until none is too near."""
         embedding = self._fitted.embedding
@@ -209,11 +223,11 @@ class NaturalFrames:
             yield attempt / (_PUSHES + 1)
             nearby, pushed = [], []
             for index, time in enumerate(moments):
-                place = self._placed(positions[index], time)
+                place = self._finished(positions[index], time, placements[index])
                 near, moved = resolver.pushed(index, place, time)
                 nearby.append(near & ~self.still)
-                push = np.where(nearby[-1][:, None], embedding.vectors_to_cube(moved - place, time), 0.0)
-                pushed.append(positions[index] + push)
+                push = placements[index].undo_vectors(embedding.vectors_to_cube(moved - place, time))
+                pushed.append(positions[index] + np.where(nearby[-1][:, None], push, 0.0))
             if not any(near.any() for near in nearby):
                 return positions
             # The last push stands as it is; so does the only one where extra turns come on top of the surface's path.

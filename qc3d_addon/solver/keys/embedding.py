@@ -118,7 +118,7 @@ class Embedding:
     @classmethod
     def of(cls, pair: KeyPair) -> Embedding:
         """Embed a pair: both keys, the second one without its rigid motion, fill [0.17, 0.83]^3."""
-        still = np.linalg.norm(pair.key1 - pair.key0, axis=1) <= STILL_TOLERANCE * pair.diagonal
+        still = pair.travel <= STILL_TOLERANCE
         motion = (
             RigidMotion.identity() if still.any() else RigidMotion.of_surface(pair.key0, pair.key1, pair.faces)
         )
@@ -135,6 +135,11 @@ class Embedding:
     def from_cube(self, points: Floats, time: float) -> Floats:
         """Points (k, 3) from cube units back to the keys' units, moved along the rigid motion up to ``time``."""
         return self.motion.apply((points - 0.5) / self.scale + self.centre, time)
+
+    def straight(self, time: float) -> Floats:
+        """(n, 3) cube positions at ``time`` that ``from_cube`` takes to the straight lines between the keys."""
+        line = (1.0 - time) * self.pair.key0 + time * self.pair.key1
+        return self.to_cube(self.motion.apply(line, -time))
 
     def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
         """Displacements (k, 3) at ``time`` from the keys' units to cube units: ``from_cube`` undone for differences."""

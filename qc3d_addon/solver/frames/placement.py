@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a frame stands: its calm parts beside the straight lines between the keys.
+
+Lengths, turns and volumes tell a frame's shape and leave its place to weak anchors, so that where nothing is still the
+whole frame would drift. It is carried rigidly to where the vertices that travel least go straight.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..keys.embedding import STILL_TOLERANCE, Embedding
+from ..numerics.rotations import rotation_matrices, rotation_vectors
+
+# Vertices that travel less than this part of all count most.
+_CALM_PERCENTILE = 25.0
+# What travels less than this part of the size is held the more strongly the less it travels, so that it makes no
+# difference whether a vertex is just still or just not.
+_HELD = 1e-4
+# Steps of the alignment; frames are a few degrees away, and each step leaves the third power of the angle.
+_STEPS = 3
+# Of the moments of inertia: what lies in a line is not turned about it.
+_RIDGE = 1e-12
+# How fast the placement sets in beside an inner key, where it must not change velocities.
+_ONSET = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """The rigid motion x -> R (x - c) + c + d.
+
+    Parameters
+    ----------
+    turn : (3,)
+        Rotation vector of R, radians.
+    centre : (3,)
+        c.
+    shift : (3,)
+        d.
+    """
+
+    turn: Floats
+    centre: Floats
+    shift: Floats
+
+    @classmethod
+    def between(cls, shape: Floats, target: Floats, weights: Floats) -> Placement:
+        """Nearly the best rigid motion of the points ``shape`` (n, 3) onto ``target`` with weights (n,) of sum 1.
+
+        A few Gauss-Newton steps from rest: they find what is a few degrees away and, other than the best fit, change
+        gradually with the points, never by half a turn where the target is flattened or reversed.
+        """
+        centre, wanted = weights @ shape, weights @ target
+        spread, goal = shape - centre, target - wanted
+        turned, rotation = spread, np.eye(3)
+        squares = float(weights @ (spread**2).sum(axis=1))
+        for _ in range(_STEPS):
+            products = turned.T @ (weights[:, None] * turned)
+            inertia = (squares * (1.0 + _RIDGE) + 1e-300) * np.eye(3) - products
+            moment = weights @ np.cross(turned, goal)
+            step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
+            turned, rotation = turned @ step.T, step @ rotation
+        return cls(rotation_vectors(rotation[None])[0], centre, wanted - centre)
+
+    def scaled(self, part: float) -> Placement:
+        """A part, 0..1, of the motion."""
+        return Placement(part * self.turn, self.centre, part * self.shift)
+
+    def apply(self, points: Floats) -> Floats:
+        """Points (k, 3), carried along."""
+        return np.asarray((points - self.centre) @ self._rotation.T + (self.centre + self.shift))
+
+    def undo_vectors(self, vectors: Floats) -> Floats:
+        """Displacements (k, 3), turned back."""
+        return np.asarray(vectors @ self._rotation)
+
+    @property
+    def _rotation(self) -> Floats:
+        return np.asarray(rotation_matrices(self.turn[None])[0])
+
+
+class Placer:
+    """Places the shapes of an embedded pair.
+
+    Parameters
+    ----------
+    embedding : Embedding
+    extra_turns : int
+        With full turns that the keys cannot tell, straight lines between them tell nothing of the way.
+    """
+
+    def __init__(self, embedding: Embedding, extra_turns: int = 0) -> None:
+        self._embedding = embedding
+        self._inner = (False, False)
+        self._knows = extra_turns == 0
+        self._weights = _calm_weights(embedding.pair.travel, embedding.weights)
+
+    def beside(self, inner: tuple[bool, bool]) -> Placer:
+        """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
+        other = copy.copy(self)
+        other._inner = inner
+        return other
+
+    def of(self, shape: Floats, time: float) -> Placement:
+        """Where to carry a shape (n, 3) at ``time``, cube units."""
+        if not self._knows:
+            return Placement(np.zeros(3), np.zeros(3), np.zeros(3))
+        whole = Placement.between(shape, self._embedding.straight(time), self._weights)
+        return whole.scaled(_onset(time, self._inner))
+
+
+def _calm_weights(travel: Floats, areas: Floats) -> Floats:
+    """(n,) weights with sum 1: still vertices before all, then those that travel least.
+
+    Parameters
+    ----------
+    travel : (n,)
+        Distances between the keys over the size of the first.
+    areas : (n,)
+        Positive.
+    """
+    reach = float(np.percentile(travel, _CALM_PERCENTILE))
+    weights = np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2))
+    weights += (_HELD / np.maximum(travel, STILL_TOLERANCE)) ** 4
+    weights *= areas
+    return np.asarray(weights / weights.sum())
+
+
+def _onset(time: float, inner: tuple[bool, bool]) -> float:
+    """The part of the placement, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
+    before = 1.0 - (1.0 - time) ** _ONSET if inner[0] else 1.0
+    after = 1.0 - time**_ONSET if inner[1] else 1.0
+    return before * after

@@ -86,9 +86,10 @@ class NaturalFrames:
 
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates at both keys, in the keys' own coordinates."""
-        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**-3
+        embedding = self._fitted.embedding
+        motion, axes, volume = embedding.motion, embedding.axes, embedding.scale**-3
         first, second = self._surface.end_rates()
-        spins = (first.spin + motion.turn, second.spin @ motion.rotation.T + motion.turn)
+        spins = ((first.spin + motion.turn) @ axes, (second.spin @ motion.rotation.T + motion.turn) @ axes)
         return Rates(spins[0], first.strain, volume * first.growth), Rates(
             spins[1], second.strain, volume * second.growth
         )
@@ -98,8 +99,9 @@ class NaturalFrames:
 
         ``inner`` tells which of the two lies between this pair and another one.
         """
-        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**3
-        spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
+        embedding = self._fitted.embedding
+        motion, axes, volume = embedding.motion, embedding.axes.T, embedding.scale**3
+        spins = (first.spin @ axes - motion.turn, (second.spin @ axes - motion.turn) @ motion.rotation)
         changed = copy.copy(self)
         changed._surface = self._surface.with_end_rates(
             Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)

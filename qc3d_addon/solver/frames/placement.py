@@ -98,7 +98,7 @@ class Placer:
         self._embedding = embedding
         self._inner = (False, False)
         self._knows = extra_turns == 0
-        self._weights = _calm_weights(embedding.pair.travel, embedding.weights)
+        self._weights = _calm_weights(embedding.travel, embedding.weights)
 
     def beside(self, inner: tuple[bool, bool]) -> Placer:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""

@@ -17,6 +17,7 @@ from ..triangles.deformation import TriangleDeformation
 from ..triangles.geometry import areas, vertex_areas
 from ..triangles.topology import face_adjacency, welded
 from .keypair import KeyPair
+from .own_axes import own_axes
 
 STILL_TOLERANCE = 1e-6
 MARGIN = 0.17
@@ -96,21 +97,28 @@ class RigidMotion:
 class Embedding:
     """One similarity of both keys into the cube, and the rigid motion that was taken out of the second key.
 
+    The cube stands along axes that the keys define themselves: keys that are moved, turned and scaled alike come to lie
+    in it in the same way.
+
     Parameters
     ----------
     pair : KeyPair
-    still : (n,) bool
-        Vertices that both keys leave in place; where there is one, ``motion`` is the identity.
+    axes : (3, 3)
+        Orthonormal rows: the axes of the cube in the keys' coordinates.
+    travel : (n,)
+        Distances between the two positions of each vertex over the diagonal of the first key's box along the axes.
     motion : RigidMotion
-        Carries the first key along with the second as their surface does on average, in the keys' own units.
+        Carries the first key along with the second as their surface does on average, in the keys' own units, seen
+        along the axes. The identity where a vertex is still.
     centre : (3,)
-        Point that goes to the middle of the cube.
+        Point that goes to the middle of the cube, seen along the axes.
     scale : float
         Cube units per unit of the keys.
     """
 
     pair: KeyPair
-    still: Bools
+    axes: Floats
+    travel: Floats
     motion: RigidMotion
     centre: Floats
     scale: float
@@ -118,33 +126,40 @@ class Embedding:
     @classmethod
     def of(cls, pair: KeyPair) -> Embedding:
         """Embed a pair: both keys, the second one without its rigid motion, fill [0.17, 0.83]^3."""
-        still = pair.travel <= STILL_TOLERANCE
-        motion = (
-            RigidMotion.identity() if still.any() else RigidMotion.of_surface(pair.key0, pair.key1, pair.faces)
-        )
-        both = np.concatenate([pair.key0, motion.undo(pair.key1)])
+        axes = own_axes(pair.key0, pair.key1, vertex_areas(pair.key0, pair.faces))
+        key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
+        diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
+        travel = np.linalg.norm(key1 - key0, axis=1) / diagonal
+        still = travel <= STILL_TOLERANCE
+        motion = RigidMotion.identity() if still.any() else RigidMotion.of_surface(key0, key1, pair.faces)
+        both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())
         scale = (1.0 - 2.0 * MARGIN) / (size if size > 0.0 else pair.diagonal)
-        return cls(pair, still, motion, 0.5 * (low + high), scale)
+        return cls(pair, axes, travel, motion, 0.5 * (low + high), scale)
 
-    def to_cube(self, points: Floats) -> Floats:
-        """Points (k, 3) from the keys' units to cube units."""
-        return np.asarray((points - self.centre) * self.scale + 0.5)
+    @cached_property
+    def still(self) -> Bools:
+        """(n,): vertices that both keys leave in place."""
+        return np.asarray(self.travel <= STILL_TOLERANCE)
+
+    def to_cube(self, points: Floats, time: float = 0.0) -> Floats:
+        """Points (k, 3) from the keys' units to cube units, moved back along the rigid motion from ``time``."""
+        moved = self.motion.apply(points @ self.axes.T, -time)
+        return np.asarray((moved - self.centre) * self.scale + 0.5)
 
     def from_cube(self, points: Floats, time: float) -> Floats:
         """Points (k, 3) from cube units back to the keys' units, moved along the rigid motion up to ``time``."""
-        return self.motion.apply((points - 0.5) / self.scale + self.centre, time)
+        return np.asarray(self.motion.apply((points - 0.5) / self.scale + self.centre, time) @ self.axes)
 
     def straight(self, time: float) -> Floats:
         """(n, 3) cube positions at ``time`` that ``from_cube`` takes to the straight lines between the keys."""
-        line = (1.0 - time) * self.pair.key0 + time * self.pair.key1
-        return self.to_cube(self.motion.apply(line, -time))
+        return self.to_cube((1.0 - time) * self.pair.key0 + time * self.pair.key1, time)
 
     def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
         """Displacements (k, 3) at ``time`` from the keys' units to cube units: ``from_cube`` undone for differences."""
         rotation = rotation_matrices(time * self.motion.turn[None])[0]
-        return np.asarray(self.scale * (vectors @ rotation))
+        return np.asarray(self.scale * (vectors @ self.axes.T @ rotation))
 
     @cached_property
     def key0(self) -> Floats:
@@ -154,7 +169,7 @@ class Embedding:
     @cached_property
     def key1(self) -> Floats:
         """(n, 3): the second key in cube units, without its rigid motion."""
-        return self.to_cube(self.motion.undo(self.pair.key1))
+        return self.to_cube(self.pair.key1, 1.0)
 
     @cached_property
     def weights(self) -> Floats:

@@ -81,11 +81,6 @@ class KeyPair:
         return next((length for length in lengths if length > 0.0), 1.0)
 
     @cached_property
-    def travel(self) -> Floats:
-        """(n,) distances between the two positions of each vertex over the diagonal."""
-        return np.asarray(np.linalg.norm(self.key1 - self.key0, axis=1) / self.diagonal)
-
-    @cached_property
     def welding(self) -> tuple[Ints, Ints]:
         """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,).
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -78,7 +80,7 @@ def test_a_chain_has_one_velocity_at_its_inner_key() -> None:
     keys = [BAR, swinging(1.0), swinging(-0.6)]
     fits = [
         finish(fit_pair(KeyPair.checked(first, second, FACES), FitOptions()))
-        for first, second in zip(keys, keys[1:], strict=False)
+        for first, second in pairwise(keys)
     ]
     step = 1e-3
     before, key, after = frames_of(fits, [0.5 - step, 0.5, 0.5 + step]).frames

@@ -14,14 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
-from ..keys.embedding import STILL_TOLERANCE, Embedding
+from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.rotations import rotation_matrices, rotation_vectors
 
 # Vertices that travel less than this part of all count most.
 _CALM_PERCENTILE = 25.0
-# What travels less than this part of the size is held the more strongly the less it travels, so that it makes no
-# difference whether a vertex is just still or just not.
-_HELD = 1e-4
 # Steps of the alignment; frames are a few degrees away, and each step leaves the third power of the angle.
 _STEPS = 3
 # Of the moments of inertia: what lies in a line is not turned about it.
@@ -126,7 +123,7 @@ def _calm_weights(travel: Floats, areas: Floats) -> Floats:
     """
     reach = float(np.percentile(travel, _CALM_PERCENTILE))
     weights = np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2))
-    weights += (_HELD / np.maximum(travel, STILL_TOLERANCE)) ** 4
+    weights += (NEARLY_STILL / np.maximum(travel, STILL_TOLERANCE)) ** 4
     weights *= areas
     return np.asarray(weights / weights.sum())
 

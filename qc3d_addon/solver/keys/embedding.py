@@ -20,7 +20,12 @@ from .keypair import KeyPair
 from .own_axes import own_axes
 
 STILL_TOLERANCE = 1e-6
+# Of the size: what travels less is held the more strongly the less it travels, so that it makes no difference whether a
+# vertex is just still or just not.
+NEARLY_STILL = 1e-4
 MARGIN = 0.17
+# Where this part of the surface is still, it holds the whole.
+_MOST_HELD = 0.04
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +87,10 @@ class RigidMotion:
         """(3, 3) the rotation of the whole motion."""
         return np.asarray(rotation_matrices(self.turn[None])[0])
 
+    def part(self, share: float) -> RigidMotion:
+        """The motion up to ``share``, 0..1, of its way."""
+        return RigidMotion(share * self.turn, share * self.velocity)
+
     def apply(self, points: Floats, time: float = 1.0) -> Floats:
         """Move points (n, 3) along the screw up to ``time`` (0 = not at all, 1 = all the way)."""
         turn = time * self.turn
@@ -109,7 +118,7 @@ class Embedding:
         Distances between the two positions of each vertex over the diagonal of the first key's box along the axes.
     motion : RigidMotion
         Carries the first key along with the second as their surface does on average, in the keys' own units, seen
-        along the axes. The identity where a vertex is still.
+        along the axes. The less of it, the more of the surface is still.
     centre : (3,)
         Point that goes to the middle of the cube, seen along the axes.
     scale : float
@@ -130,8 +139,8 @@ class Embedding:
         key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
         diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
         travel = np.linalg.norm(key1 - key0, axis=1) / diagonal
-        still = travel <= STILL_TOLERANCE
-        motion = RigidMotion.identity() if still.any() else RigidMotion.of_surface(key0, key1, pair.faces)
+        moves = _free_part(travel, vertex_areas(key0, pair.faces))
+        motion = RigidMotion.of_surface(key0, key1, pair.faces).part(moves) if moves else RigidMotion.identity()
         both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())
@@ -154,7 +163,7 @@ class Embedding:
 
     def straight(self, time: float) -> Floats:
         """(n, 3) cube positions at ``time`` that ``from_cube`` takes to the straight lines between the keys."""
-        return self.to_cube((1.0 - time) * self.pair.key0 + time * self.pair.key1, time)
+        return self.to_cube(self.pair.key0 + time * (self.pair.key1 - self.pair.key0), time)
 
     def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
         """Displacements (k, 3) at ``time`` from the keys' units to cube units: ``from_cube`` undone for differences."""
@@ -176,3 +185,20 @@ class Embedding:
         """(n,): vertex areas of the first key, with sum 1; loose vertices count as a small area."""
         areas = vertex_areas(self.key0, self.pair.faces)
         return np.asarray(areas / areas.sum())
+
+
+def _free_part(travel: Floats, areas: Floats) -> float:
+    """How much of the whole's motion is to be taken out, 1 where nothing is still.
+
+    It falls gradually with the part of the surface that is still or nearly so: one vertex more or less must not matter.
+
+    Parameters
+    ----------
+    travel : (n,)
+        Distances between the keys over the size.
+    areas : (n,)
+        Of the surface around the vertices.
+    """
+    held = float(areas @ (1.0 / (1.0 + (travel / NEARLY_STILL) ** 2))) / float(areas.sum())
+    part = min(held / _MOST_HELD, 1.0)
+    return 1.0 - part * part * (3.0 - 2.0 * part)

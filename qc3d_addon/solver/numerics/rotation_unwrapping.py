@@ -24,6 +24,7 @@ from .rotations import nearest_branch, products, rotation_matrices, rotation_vec
 
 _MOST_SWING = 1.55 * np.pi
 _FAIR_SHARE = 0.02
+_DIGITS = 9
 _MEAN_STEPS = 30
 _MEAN_FOUND = 1e-13  # radians
 
@@ -54,10 +55,17 @@ class Turning:
     @property
     def angles(self) -> Floats:
         """(m,) how far each element turns, radians."""
-        return np.asarray(np.maximum(np.linalg.norm(self.swing, axis=1), np.linalg.norm(self.twist, axis=1)))
+        return self.angles_from(np.zeros(3))
+
+    def angles_from(self, rest: Floats) -> Floats:
+        """(m,) how far each element turns beside what turns by ``rest`` (3,), a rotation vector in radians."""
+        parts = (self.swing, self.twist) if self.twist.any() else (self.swing - rest,)
+        return np.asarray(np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0))
 
 
-def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools) -> Turning:
+def consistent_turning(
+    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats
+) -> Turning:
     """Turn every element so that neighbours agree, beyond 180 degrees and beyond 360 where they do.
 
     Parameters
@@ -72,6 +80,8 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
         What elements count in the axis of their part.
     held : (m,) bool
         Elements that touch what both keys leave in place.
+    rest : (3,)
+        Rotation vector of what both keys leave in place: nothing, unless a motion of the whole was taken out.
 
     Notes
     -----
@@ -79,15 +89,19 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
     turn: there the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
     into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
-    Within a part the element that turns least goes the short way round. A part that nothing holds, such as a button
-    on a sleeve, goes the way that the surface of the largest part does where it is nearest.
+    Within a part the element that turns least, or most nearly as what rests where something holds the part, goes the
+    short way round. A part that nothing holds, such as a button on a sleeve, goes the way that the surface of the
+    largest part does where it is nearest.
     """
     count = len(turns)
     if not count:
         return Turning(turns.copy(), turns.copy())
     forest = _Forest(turns, adjacency)
     loose = ~np.isin(forest.labels, forest.labels[held])
-    vectors = _agreeing_parts(forest, forest.carried(turns, nearest_branch), centres, loose)
+    resting = np.where(loose[:, None], 0.0, rest)
+    forest = forest.rooted(_relative_angles(turns, resting))
+    started = np.where(loose[:, None], turns, nearest_branch(turns, resting)) if rest.any() else turns
+    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
@@ -125,7 +139,8 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     mean = np.eye(3)
     for _ in range(_MEAN_STEPS):
         beside = rotation_vectors(mean.T @ rotations)
-        step = shares @ forest.rooted(beside).carried(beside, nearest_branch)
+        rooted = forest.rooted(np.linalg.norm(beside, axis=1))
+        step = shares @ rooted.carried(beside, nearest_branch)
         mean = mean @ rotation_matrices(step[None])[0]
         if np.linalg.norm(step) < _MEAN_FOUND:
             break
@@ -161,27 +176,27 @@ def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
 
 
 class _Forest:
-    """A spanning tree of each connected part, over the smallest relative rotations, rooted where it turns least."""
+    """A spanning tree of each connected part, over the smallest relative rotations."""
 
     def __init__(self, turns: Floats, adjacency: Ints) -> None:
         count = len(turns)
         first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 takes no others
-        # A relative rotation of zero must still count as an edge of the graph.
-        cost = _relative_angles(turns[first], turns[second]) + 1e-9
+        # A relative rotation of zero must still count as an edge of the graph; which of several alike are taken must
+        # not depend on rounding.
+        cost = np.round(_relative_angles(turns[first], turns[second]), _DIGITS) + 10.0**-_DIGITS
         tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
         self.labels: Ints = np.asarray(connected_components(tree, directed=False)[1], dtype=np.int64)
         self._edges: list[Ints] = [end.astype(np.int64) for end in tree.nonzero()]
-        self._root(turns)
 
-    def rooted(self, turns: Floats) -> _Forest:
-        """The same trees where elements turn by ``turns`` (m, 3) instead, all beside one and the same rotation."""
+    def rooted(self, angles: Floats) -> _Forest:
+        """The same trees, each rooted where the angles (m,) are smallest."""
         other = copy.copy(self)
-        other._root(turns)
+        other._root(angles)
         return other
 
-    def _root(self, turns: Floats) -> None:
-        count, labels = len(turns), self.labels
-        by_angle = np.lexsort((np.linalg.norm(turns, axis=1), labels))
+    def _root(self, angles: Floats) -> None:
+        count, labels = len(angles), self.labels
+        by_angle = np.lexsort((np.round(angles, _DIGITS), labels))
         self.roots: Ints = by_angle[np.searchsorted(labels[by_angle], np.arange(labels.max() + 1))]
         # One more node joins all roots, so that one search covers every part.
         rows, columns = self._edges

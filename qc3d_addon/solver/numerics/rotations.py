@@ -11,6 +11,10 @@ from ..arrays import Floats
 _NEWTON_STEPS = 20
 _SMALL_ANGLE = 1e-4
 _NO_ANGLE = 1e-12  # below this the axis is lost to rounding
+# Cosines of half the angle below this are those of half a turn in single precision.
+_HALF_TURN = 1e-6
+# Across none of the axes that symmetric shapes are turned about.
+_HALF_TURN_SIDE = np.array([0.83, 0.46, 0.31])
 
 
 def by_component(matrices: Floats) -> Floats:
@@ -78,7 +82,11 @@ def _closest_rotations_svd(matrices: Floats) -> Floats:
 
 
 def rotation_vectors(rotations: Floats) -> Floats:
-    """(k, 3) rotation vectors (axis times angle, angle in [0, pi]) of rotation matrices."""
+    """(k, 3) rotation vectors (axis times angle, angle in [0, pi]) of rotation matrices.
+
+    Of the two ways to turn by half a turn it is always the same one, not the one that rounding prefers; the angle may
+    exceed pi by that much.
+    """
     quaternions = _quaternions(rotations)
     vector, scalar = quaternions[:, 1:], quaternions[:, 0]
     sine = np.linalg.norm(vector, axis=1)
@@ -87,7 +95,10 @@ def rotation_vectors(rotations: Floats) -> Floats:
 
 
 def _quaternions(rotations: Floats) -> Floats:
-    """(k, 4) unit quaternions, scalar first and not negative; stable for every angle (Shepperd 1978)."""
+    """(k, 4) unit quaternions, scalar first and not negative; stable for every angle (Shepperd 1978).
+
+    Where the scalar is zero but for rounding, the vector points the way of ``_HALF_TURN_SIDE``.
+    """
     diagonal = np.einsum("kii->ki", rotations)
     trace = diagonal.sum(axis=1)
     skew = np.stack(
@@ -110,7 +121,8 @@ def _quaternions(rotations: Floats) -> Floats:
     best = np.argmax(np.einsum("kii->ki", table), axis=1)
     quaternions = table[np.arange(count), best]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return np.asarray(quaternions * np.where(quaternions[:, :1] < 0.0, -1.0, 1.0))
+    side = np.where(np.abs(quaternions[:, 0]) < _HALF_TURN, quaternions[:, 1:] @ _HALF_TURN_SIDE, quaternions[:, 0])
+    return np.asarray(quaternions * np.where(side < 0.0, -1.0, 1.0)[:, None])
 
 
 def rotation_matrices(vectors: Floats) -> Floats:

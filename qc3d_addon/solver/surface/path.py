@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..keys.embedding import Embedding
+from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import Turning, consistent_turning
 from ..numerics.rotations import by_component
@@ -76,7 +76,7 @@ class SurfacePath:
         self._apart = None
         if embedding.pair.nearly_coincident:
             self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
-        self._travel = key1 - self._key0
+        self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
         faces = self._group[embedding.pair.faces]
@@ -84,9 +84,11 @@ class SurfacePath:
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
-        self.turning = consistent_turning(usable.turns, face_adjacency(usable.faces), centres, usable.weights, held)
+        rest = -embedding.motion.turn
+        neighbours = face_adjacency(usable.faces)
+        self.turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, rest)
         if free_after_turns:
-            still[usable.faces[self.turning.angles > np.pi]] = False
+            still[usable.faces[self.turning.angles_from(rest) > np.pi]] = False
         self.still = still[self._group]
         self._free = ~still
         self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
@@ -100,9 +102,12 @@ class SurfacePath:
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
+        # What hardly travels is drawn to its straight line, in the limit as if it were still.
+        travel = np.maximum(embedding.travel[self.vertices], STILL_TOLERANCE)
+        self._line_weights = (NEARLY_STILL / travel) ** 4
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
-            usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights
+            usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights + self._line_weights
         )
         rows = self._surface.rows
         self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
@@ -115,7 +120,8 @@ class SurfacePath:
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
         np.maximum.at(strongest, self._group, factors)
-        stronger._surface = self._surface.with_anchor_weights(self._anchor_weights * strongest)
+        stronger._anchor_weights = self._anchor_weights * strongest
+        stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
 
     def end_rates(self) -> tuple[Rates, Rates]:
@@ -184,8 +190,10 @@ class SurfacePath:
             turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
         tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
-        start = self._key0 + time * self._travel
-        start[self._free] = anchors[self._free]
+        lines = self._embedding.straight(time)[self.vertices]
+        share = (self._line_weights / (self._anchor_weights + self._line_weights))[:, None]
+        anchors = anchors + share * (lines - anchors)
+        start = np.where(self._free[:, None], anchors, lines)
         return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
 
 

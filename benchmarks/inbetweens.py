@@ -5,7 +5,7 @@
     python benchmarks/inbetweens.py                                   # every pair, every method, resumed
     python benchmarks/inbetweens.py --pairs body:rest:t_pose bar:straight:bend180 --methods straight natural
     python benchmarks/inbetweens.py --listed --check                  # exit status 1 where `natural` falls short
-    python benchmarks/inbetweens.py --write                           # the tables and sheets of docs/inbetweens.md
+    python benchmarks/inbetweens.py --write   # the tables and sheets of docs/science/inbetweens.md
 
 The list of pairs and the shapes are found by QC3D_PAIRS and QC3D_DATA. Results are kept in a folder, one for each pair
 and method, and made again when the sources that they depend on have changed.

@@ -19,7 +19,7 @@ from .methods import METHODS, Contest
 from .results import Results
 from .verdict import RIVALRY, Verdict
 
-DOCUMENT = ROOT / "docs/inbetweens.md"
+DOCUMENT = ROOT / "docs/science/inbetweens.md"
 
 
 def measure_pair(pair: Pair, methods: list[str], results: Results) -> str:

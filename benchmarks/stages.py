@@ -5,7 +5,7 @@
     python -m benchmarks.stages                                  # real pairs, both engines, against the yardstick
     python -m benchmarks.stages --growth                         # the limb that a sphere becomes, 1k to 200k vertices
     python -m benchmarks.stages --against HEAD~3 [--cases ...]   # two revisions in turn, ratios by stage
-    python -m benchmarks.stages --write                          # the tables of docs/speed.md
+    python -m benchmarks.stages --write                          # the tables of docs/science/speed.md
 
 The yardstick is the time of fTetWild with its own defaults on the same surface, in the same run.
 """
@@ -26,7 +26,7 @@ from .catalogue import DATA, ROOT
 from .report import table, write_between_markers
 from .stage_cases import LIMITS, SIZES
 
-DOCUMENT = ROOT / "docs/speed.md"
+DOCUMENT = ROOT / "docs/science/speed.md"
 STAGES = ("mesh", "locate", "path", "fit", "factor", "frames", "measure", "write")
 _ROUNDS = 3
 

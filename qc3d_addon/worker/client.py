@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a task in a child process: asks how far it is, stops it, and turns every way to fail into one typed error."""
+"""Runs a task in a child process: reports progress, can stop it, and turns every kind of failure into a typed error."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from .exchange import read_outcome, write_task
 from .idleness import LONGEST_IDLE, Idleness
 
 CHILD = Path(__file__).with_name("task_child.py")
-_LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may hold a scipy that is not the bundled one
-_POLL_SECONDS = 0.05
-_LONGEST_MESSAGE = 1_000_000
+_LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may contain another scipy than the bundled one
+_POLL_SECONDS = 0.05  # short beside any work, and long enough to take no processor time
+_LONGEST_MESSAGE = 1_000_000  # bytes; more without an end is not a message of ours
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child process may use.
+    """Limits of a child process.
 
     Parameters
     ----------
-    seconds
+    seconds : float
         Time after which it is stopped.
-    memory_mb
-        Most memory it may allocate, in megabytes; 0 for no limit. Enforced on Linux only.
+    memory_mb : int
+        Megabytes that it may allocate; 0 for no limit. Enforced on Linux only.
     """
 
     seconds: float = 3600.0
@@ -49,14 +49,20 @@ class Limits:
 
 
 class Worker:
-    """A task at work in a child process. Use it from one thread, and call ``close`` at the end, whatever happened.
+    """A task that runs in a child process. Use it from one thread only, and always call ``close`` at the end.
+
+    Parameters
+    ----------
+    task : Task
+        What to compute.
+    limits : Limits, optional
 
     Raises
     ------
     InputError
         If the task needs more memory than its limit.
     WorkerError
-        If the child cannot be started.
+        If the child process cannot be started.
     """
 
     def __init__(self, task: Task, limits: Limits | None = None) -> None:
@@ -64,7 +70,7 @@ class Worker:
         self._limits = limits or Limits()
         task.require_memory(self._limits.memory_mb)
         self._progress: Progress | None = None
-        self._ending: list[str] | None = None  # empty where the work was done, else the kind of error and its sentence
+        self._ending: list[str] | None = None  # empty after success, else the type of the error and its message
         self._is_garbled = False
         self._is_closed = False
         try:
@@ -88,16 +94,16 @@ class Worker:
 
     @property
     def progress(self) -> Progress | None:
-        """The newest progress; None before the first."""
+        """The latest progress; None before the first report."""
         return self._progress
 
     def poll(self) -> Outcome | None:
-        """The outcome when it is there, None while the work goes on.
+        """The outcome of the task, or None while it is running.
 
         Raises
         ------
         QC3DError
-            The error that ended the work, a WorkerError where the process ended by itself or by its limits.
+            The error that ended the work; a WorkerError if the process crashed or exceeded its limits.
         """
         if self._process.poll() is None:
             if self._is_garbled:
@@ -113,7 +119,7 @@ class Worker:
                     "add-on's preferences, or choose a lower quality."
                 )
             return None
-        _kill(self._process)  # what the child started may outlive it, and hold on to its end of the pipe
+        _kill(self._process)  # processes that the child started may outlive it and keep the pipe open
         self._reader.join()
         try:
             return self._result()
@@ -121,7 +127,7 @@ class Worker:
             self.close()
 
     def close(self) -> None:
-        """Stop the child if it still works, and remove its files; nothing happens the second time."""
+        """Stop the child if it is still running, and remove its files. Calling it again does nothing."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -140,7 +146,7 @@ class Worker:
             raise WorkerError("No Python interpreter was found to work in; install Blender with its own Python.")
         package = Path(__file__).resolve().parent.parent
         memory = self._limits.memory_mb * 2**20
-        # Without the interpreter's own packages: the child is to use the libraries that this process would.
+        # Without the interpreter's own packages: the child must use the same libraries as this process.
         command = [python, "-I", "-S", CHILD, package, self._folder.path, memory, *_library_folders()]
         flags = 0
         if sys.platform == "win32":
@@ -149,7 +155,7 @@ class Worker:
         with open(self._errors, "wb") as stream:
             return subprocess.Popen(
                 [str(part) for part in command],
-                stdin=subprocess.PIPE,  # never written to: its end tells the child that this process is gone
+                stdin=subprocess.PIPE,  # never written to: when it closes, the child knows that this process is gone
                 stdout=subprocess.PIPE,
                 stderr=stream,
                 creationflags=flags,
@@ -157,13 +163,13 @@ class Worker:
             )
 
     def _read_messages(self) -> None:
-        """Keep the newest progress and the message that ends the work, until the child closes its end."""
+        """Read messages until the child closes the pipe; keep the latest progress and the final message."""
         stream = self._process.stdout
         assert stream is not None
         rest = b""
         while chunk := os.read(stream.fileno(), 65536):
             if self._is_garbled:
-                continue  # read on: a child that cannot write would not end
+                continue  # keep reading: a child that cannot write would never end
             *whole, rest = (rest + chunk).split(b"\0")
             for text in whole:
                 self._take(text)
@@ -224,7 +230,7 @@ def _out_of_memory(limits: Limits) -> str:
 
 
 def _message(text: bytes) -> Progress | list[str]:
-    """A message of the child: how far it is, or how it ended; raises ValueError or TypeError where it is neither."""
+    """Parse a message of the child: progress, or how the work ended; ValueError or TypeError if it is neither."""
     message = json.loads(text)
     if message == {"done": True}:
         return []
@@ -240,12 +246,12 @@ def _message(text: bytes) -> Progress | list[str]:
 
 
 def run(task: Task, on_progress: Callable[[Progress], None] | None = None, limits: Limits | None = None) -> Outcome:
-    """Carry out a task in a child process and wait for it.
+    """Carry out a task in a child process and wait for its outcome.
 
     Raises
     ------
     QC3DError
-        As ``Worker.poll``.
+        As ``Worker`` and ``Worker.poll``.
     """
     worker = Worker(task, limits)
     shown = None
@@ -263,7 +269,7 @@ def run(task: Task, on_progress: Callable[[Progress], None] | None = None, limit
 
 
 def _library_folders() -> list[Path]:
-    """The folders that the libraries are in, found without importing them."""
+    """The folders that contain the libraries, found without importing them."""
     folders = []
     for name in _LIBRARIES:
         spec = importlib.util.find_spec(name)
@@ -275,12 +281,12 @@ def _library_folders() -> list[Path]:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End the child and whatever it started, which may still be there when the child is not."""
+    """End the child and all processes that it started, which may outlive it."""
     if sys.platform != "win32":
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
     elif process.poll() is None:
-        # By its whole name: Windows would look for it in the working folder first.
+        # By its full path: Windows would search the working folder first.
         taskkill = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "taskkill.exe")
         subprocess.run([taskkill, "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
         process.kill()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which meshing engine will do the work here, found out without loading anything into this process."""
+"""Finds out which meshing engine works on this machine, without loading anything into this process."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ _notice: str | None = None
 
 
 def engine_notice() -> str | None:
-    """The sentence to show where the engine ``auto`` means delaunay, or None where fTetWild works.
+    """A sentence for the user if tetwild does not work here and delaunay takes over; None if it works.
 
-    Quick enough for a panel: the first call starts a child process that only loads fTetWild (a wheel made for newer
-    systems is found out no other way), later calls look whether it has ended. Until then the answer is None.
+    Fast enough for a panel's drawing: the first call starts a child process that only loads fTetWild, which is the only
+    way to detect a wheel made for a newer system. Later calls check whether it has ended; until then, the answer is
+    None.
     """
     global _asked, _notice, _probe
     if not _asked:
@@ -41,7 +42,7 @@ def engine_notice() -> str | None:
 
 
 def forget() -> None:
-    """End the child process if it still runs, so that nothing is left behind; the next call asks again."""
+    """Stop the child process if it is still running, and forget its answer; the next ``engine_notice`` starts anew."""
     global _asked, _notice, _probe
     if _probe is not None:
         _probe.kill()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A task and its outcome as files of one folder: arrays as .npy and .npz without pickles, plain values as JSON."""
+"""A task and its outcome as files in a folder: arrays as .npy and .npz without pickles, plain values as JSON."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TASK, _OUTCOME = "task.json", "outcome.json"
 
 
 def write_task(folder: Path, task: Task) -> None:
-    """Put a task into an empty folder."""
+    """Write a task into an empty folder; ``read_task`` reads it."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
         _write(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
         if ends in task.kept:
@@ -43,7 +43,7 @@ def write_task(folder: Path, task: Task) -> None:
 
 
 def read_task(folder: Path) -> Task:
-    """The task that ``write_task`` put there."""
+    """Read the task that ``write_task`` wrote."""
     header = _read_json(folder / _TASK)
     pairs, kept = {}, {}
     for number, (first, second) in enumerate(header["ends"]):
@@ -65,7 +65,7 @@ def read_task(folder: Path) -> Task:
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
-    """Put what came of the task beside it."""
+    """Write the outcome of a task into the same folder."""
     for number, data in enumerate(outcome.fits.values()):
         (folder / f"made{number}.map").write_bytes(data)
     report = None
@@ -78,12 +78,12 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
 
 
 def read_outcome(folder: Path, task: Task) -> Outcome:
-    """What ``write_outcome`` put there.
+    """Read the outcome that ``write_outcome`` wrote.
 
     Raises
     ------
     OSError, ValueError, KeyError
-        If it is not there whole, or not what the task asked for.
+        If it is incomplete, or not what the task asked for.
     """
     header = _read_json(folder / _OUTCOME)
     maps = {

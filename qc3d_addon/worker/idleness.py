@@ -1,26 +1,25 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a child process still does anything: one that waits for what never comes takes no processor's time."""
+"""Detects a child process that hangs: one that waits forever uses no processor time."""
 
 from __future__ import annotations
 
 import time as clock
 from pathlib import Path
 
-# Even a machine with far too much to do gives a process its turn in this time.
-LONGEST_IDLE = 120.0
-_PAUSE = 10.0  # between looks, each of which takes some milliseconds
+LONGEST_IDLE = 120.0  # seconds; even an overloaded machine gives every process a turn within this time
+_PAUSE = 10.0  # seconds between checks, each of which takes some milliseconds
 
 
 class Idleness:
-    """Watches a child process and what it started, where the system tells (Linux).
+    """Watches the processor time of a child process and of all that it started. Works on Linux only.
 
-    A thread that gets no memory as it starts leaves the others waiting for it, forever.
+    A child can hang, for example, when a new thread gets no memory and the others wait for it forever.
 
     Parameters
     ----------
-    group
-        Number of the process group that they belong to.
+    group : int
+        The process group that they belong to.
     """
 
     def __init__(self, group: int) -> None:
@@ -30,7 +29,7 @@ class Idleness:
 
     @property
     def lasts_too_long(self) -> bool:
-        """Whether none of them has done anything for ``LONGEST_IDLE`` seconds."""
+        """Whether the group has used no processor time for ``LONGEST_IDLE`` seconds."""
         now = clock.monotonic()
         if now - self._looked >= _PAUSE:
             self._looked = now
@@ -41,7 +40,7 @@ class Idleness:
 
 
 def _processor_time(group: int) -> int:
-    """Ticks of processor's time that the processes of a group have had; 0 where the system does not tell."""
+    """Processor time used by a process group, in clock ticks; 0 where the system does not tell."""
     total = 0
     for file in Path("/proc").glob("[0-9]*/stat"):
         try:

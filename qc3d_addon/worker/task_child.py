@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Carry out one task in a process of its own, started by :mod:`qc3d_addon.worker.client`::
+"""The child process that carries out one task, started by :mod:`qc3d_addon.worker.client`::
 
     python -I -S task_child.py PACKAGE FOLDER MEMORY LIBRARIES...
 
-PACKAGE is the folder of this package, whatever its name there; FOLDER holds the task and takes the outcome; MEMORY is
-the most that the work may allocate, in bytes, 0 for no limit; LIBRARIES are the folders to find numpy, scipy and
-pytetwild in. Messages go to standard output, each a JSON object that ends with a zero byte: ``{"progress": [stage,
-fraction]}`` while it works, and at the end ``{"done": true}`` or ``{"error": [kind, sentence]}``. When standard input
-closes, whoever started this is gone, and so is this.
+PACKAGE is the folder of this package, under whatever name; FOLDER contains the task and receives the outcome; MEMORY is
+the number of bytes that the work may allocate, 0 for no limit; LIBRARIES are the folders that contain numpy, scipy and
+pytetwild. Messages go to standard output, each a JSON object followed by a zero byte: ``{"progress": [stage, fraction,
+fit, fits]}`` during the work, and at the end ``{"done": true}`` or ``{"error": [type, message]}``. When standard input
+closes, the parent is gone, and this process ends.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
-# What threads, SuperLU and Qhull say where they get none.
+# Parts of the messages of threads, SuperLU and Qhull when they run out of memory.
 _WORDS_OF_TOO_LITTLE_MEMORY = ("start new thread", "malloc", "memory")
-_NICE = 5  # the window that the user works in comes first
+_NICE = 5  # lower priority than the window in which the user works
 
 
 def main(arguments: list[str]) -> None:
     package, folder, memory, libraries = Path(arguments[0]), Path(arguments[1]), int(arguments[2]), arguments[3:]
-    # Native code may write to standard output; its text must not end up among the messages.
+    # Native code may write to standard output; its text must not get between the messages.
     messages = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    tempfile.tempdir = str(folder)  # for what fTetWild needs: gone with the folder, whatever happens
+    tempfile.tempdir = str(folder)  # so that fTetWild's files are removed with the folder, whatever happens
     name = _load(package)
     importlib.import_module(f"{name}.solver.support.guarded_program").share_group()
     private_folders = importlib.import_module(f"{name}.solver.files.private_folders")
@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> None:
     try:
         task = importlib.import_module(f"{name}.solver.frames.task")
         exchange = importlib.import_module(f"{name}.worker.exchange")
-        _limit_memory(memory)  # after the libraries are there: OpenBLAS waits forever for memory it does not get
+        _limit_memory(memory)  # after loading the libraries: OpenBLAS waits forever if it gets no memory
         steps = task.carry_out(exchange.read_task(folder))
         while True:
             try:
@@ -76,7 +76,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _load(package: Path) -> str:
-    """Import the package from its folder; the name it goes by here."""
+    """Import the package from its folder; return the name under which it was imported."""
     name = "qc3d_child"
     spec = importlib.util.spec_from_file_location(
         name, package / "__init__.py", submodule_search_locations=[str(package)]
@@ -95,7 +95,7 @@ def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
 
 
 def _end_with_parent(clear_up: Callable[[], None]) -> None:
-    """Wait until standard input closes, then clear up and end this process and what it started."""
+    """Wait until standard input closes, then clean up and end this process and all that it started."""
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
@@ -106,7 +106,7 @@ def _end_with_parent(clear_up: Callable[[], None]) -> None:
 
 
 def _limit_memory(limit: int) -> None:
-    """Let allocations of more than ``limit`` bytes beyond what is held now fail, where the system can do that."""
+    """Make allocations fail beyond ``limit`` more bytes than are allocated now; only Linux can do that."""
     if limit <= 0 or sys.platform != "linux":
         return
     import resource
@@ -114,7 +114,7 @@ def _limit_memory(limit: int) -> None:
     import numpy as np
     from scipy.linalg import blas
 
-    # Both copies of OpenBLAS take their buffers at the first product, and end the process where they get none.
+    # Both copies of OpenBLAS allocate buffers at their first product, and end the process if they get none.
     square = np.ones((256, 256))
     blas.dgemm(1.0, square, square @ np.linalg.inv(square + 256.0 * np.eye(256)))
     held = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData:"))

@@ -115,7 +115,8 @@ def _stored_map() -> bytes:
     mesh = _mesh()
     maps = np.stack([mesh.points, _moved()])
     turns = np.zeros((len(mesh.tets), 3))
-    return storage.to_bytes(FittedMap(_pair(), mesh, maps, turns, 0, "delaunay", "finest", ("Two.",), {}))
+    fitted = FittedMap.restored(_pair(), mesh, maps, turns, FitOptions(), "delaunay", ("Two.",))
+    return storage.to_bytes(fitted)
 
 
 @cache

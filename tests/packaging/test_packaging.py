@@ -33,7 +33,8 @@ def test_the_manifest_alone_holds_the_version(repository: Path, wheel: zipfile.Z
 
 
 def test_the_wheel_holds_every_module_and_nothing_else(repository: Path, wheel: zipfile.ZipFile) -> None:
-    modules = {str(path.relative_to(repository)) for path in (repository / "qc3d_addon").rglob("*.py")}
+    packages = (repository / "qc3d_addon", repository / "qc3d_paper")
+    modules = {str(path.relative_to(repository)) for package in packages for path in package.rglob("*.py")}
     packed = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert packed == modules
     assert any(name.endswith("LICENSE") for name in wheel.namelist())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tree of boxes around the triangles of a moving surface: built once, fitted to every shape."""
+"""A bounding-volume hierarchy for the triangles of a deforming surface: built once, refitted to every shape."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import QC3DError
 from ..triangles.topology import among, distinct
 
-# So many pairs of boxes are compared at once.
-_CHUNK = 500_000
-# Pairs around a vertex grow with the square of its triangles; around one with more than these they are not listed, but
-# its triangles are kept together in the tree, and no two of them are compared.
+_CHUNK = 500_000  # pairs of boxes compared at once: bounds the memory of a search
+# The number of pairs of triangles around a vertex grows with the square of its triangles. For vertices with more
+# triangles than this the pairs are not listed; instead the triangles are kept together in the tree and never compared.
 _MOST_AROUND_A_VERTEX = 64
-# How much a search may compare: ordinary meshes need 10 to 60 for each triangle.
+# Comparisons that a search may make. Ordinary meshes need 10 to 60 for each triangle.
 _LEAST_WORK, _WORK_PER_TRIANGLE = 5_000_000, 1000
 
 Pairs = tuple[Ints, Ints]
@@ -26,28 +25,34 @@ Values = TypeVar("Values", Floats, Bools)
 
 
 class CrowdedError(QC3DError):
-    """So many triangles lie over each other that comparing them all would take too long."""
+    """So many triangles overlap that comparing them all would take too long."""
 
 
 class Budget:
-    """The work that one search in a surface may cost.
+    """A limit on the work of one search.
 
     Parameters
     ----------
     triangles : int
-        How many the surface has.
+        Number of triangles of the surface.
 
     Attributes
     ----------
     left : int
-        Comparisons of two boxes that may still be made; other work counts as so many of these.
+        Remaining comparisons of two boxes; other work is counted in the same unit.
     """
 
     def __init__(self, triangles: int) -> None:
         self.left = _LEAST_WORK + _WORK_PER_TRIANGLE * triangles
 
     def spend(self, work: int) -> None:
-        """Count work before it is done; raises CrowdedError where that is more than may be done."""
+        """Deduct work before it is done.
+
+        Raises
+        ------
+        CrowdedError
+            If more than the remaining budget would be spent.
+        """
         self.left -= work
         if self.left < 0:
             raise CrowdedError(
@@ -57,24 +62,27 @@ class Budget:
 
 
 class TriangleTree:
-    """Pairs of triangles whose boxes meet, most of those that share a vertex left out.
+    """Finds pairs of triangles whose bounding boxes overlap, without most pairs that share a vertex.
 
-    A binary tree, full but for the end of each level: the nodes of a level are numbered from 0, and the children of
-    node i are 2i and 2i + 1. Boxes are fitted to a shape from the leaves up (van den Bergen 1997, "Efficient collision
-    detection of complex deformable models using AABB trees"). The boxes of nodes that have a vertex in common always
-    meet, whatever the shape: that much of every search is known beforehand. What is compared for a shape are pairs of
-    nodes that have none, while their parents have; and whatever is below pairs that meet.
+    A binary tree of axis-aligned boxes. The nodes of each level are numbered from 0, the children of node i are 2i and
+    2i + 1, and only the end of a level may be incomplete. For each shape the boxes are refitted from the leaves up (van
+    den Bergen 1997, "Efficient collision detection of complex deformable models using AABB trees").
+
+    Nodes that have a vertex in common overlap in every shape, so that part of the search is done once, when the tree is
+    built. What remains for each shape are pairs of nodes without a common vertex whose parents have one, and the
+    descendants of such pairs as long as their boxes overlap.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        Triangles.
     shapes : sequence of (n, 3)
-        Triangles that are near each other in all of these share a branch.
+        Typical shapes; triangles that are close to each other in all of them share a branch.
     moving : (m,) bool
-        Only pairs are looked for of which at least one triangle is among these.
+        Only pairs with at least one of these triangles are searched.
     groups : (m,) int64, optional
-        Labels; two triangles of the same group are no pair, those with the label -1 belong to none. Without labels,
-        the triangles around each vertex that has very many are a group.
+        Labels; triangles of the same group are never paired, and -1 means no group. By default, the triangles around
+        each vertex with very many triangles form a group.
 
     Attributes
     ----------
@@ -86,11 +94,11 @@ class TriangleTree:
         groups = _hubs(faces) if groups is None else groups
         places = np.concatenate([shape[faces].mean(axis=1).T for shape in shapes])
         if groups is not None:
-            # One more coordinate, in which groups are farther apart than anything else is.
+            # An extra coordinate separates the groups further than anything else.
             places = np.concatenate([places, 2.0 * np.ptp(places, axis=1).max() * groups[None]])
         self.order = halving_order(places)
         self._moves = [moving[self.order]]
-        # By level the group that all triangles of a node are in, -1 where there is none.
+        # For each level, the common group of all triangles below a node, or -1.
         self._groups = None if groups is None else [groups[self.order]]
         touching = _concerned(_around_vertices(faces[self.order]), self._moves[0])
         self._apart: list[Pairs] = []
@@ -104,7 +112,7 @@ class TriangleTree:
             touching = above
 
     def _wanted(self, pairs: Pairs, level: int) -> Pairs:
-        """Pairs of nodes of a level below which something moves that is not all in one group."""
+        """The pairs of nodes of a level that have moving triangles below them and are not in one group."""
         pairs = _concerned(pairs, self._moves[level])
         if self._groups is None:
             return pairs
@@ -113,12 +121,19 @@ class TriangleTree:
         return pairs[0][apart], pairs[1][apart]
 
     def meeting(self, low: Floats, high: Floats, budget: Budget) -> Iterator[Pairs]:
-        """Pairs of leaves, the smaller first, whose boxes (3, m), in the order of the leaves, meet; in chunks.
+        """Yield, in chunks, the pairs of leaves whose boxes overlap, smaller leaf first.
+
+        Parameters
+        ----------
+        low, high : (3, m)
+            Opposite corners of the leaves' boxes, in the order of the leaves.
+        budget : Budget
+            Limit on the work.
 
         Raises
         ------
         CrowdedError
-            If that costs more than the budget has left.
+            If the budget is exceeded.
         """
         boxes = [(low, high)]
         for _ in self._apart:
@@ -130,7 +145,10 @@ class TriangleTree:
     def _below(
         self, level: int, pairs: Pairs, boxes: list[tuple[Floats, Floats]], budget: Budget, known: bool
     ) -> Iterator[Pairs]:
-        """Pairs of leaves that meet below pairs of nodes that do, and, if so wished, below those known to be apart."""
+        """Pairs of overlapping leaves below overlapping pairs of nodes.
+
+        If ``known``, also below the pairs without a common vertex that were listed when the tree was built.
+        """
         while level < len(self._apart):
             count = len(self._moves[level + 1])
             pairs = self._wanted(_children(pairs, count), level + 1)
@@ -165,7 +183,7 @@ def _both(pairs: Pairs, more: Pairs) -> Pairs:
 
 
 def _joined(values: Values, join: np.ufunc, neutral: float) -> Values:
-    """Values (..., count) of a level joined two by two into those of the level above."""
+    """Values (..., count) of a level, joined in twos to those of the level above."""
     count = values.shape[-1]
     if count % 2:
         values = np.concatenate([values, np.full((*values.shape[:-1], 1), neutral, values.dtype)], axis=-1)
@@ -174,14 +192,14 @@ def _joined(values: Values, join: np.ufunc, neutral: float) -> Values:
 
 
 def _common(groups: Ints) -> Ints:
-    """(k,) groups of the nodes of the level above: that of both children, or -1."""
-    last = np.append(groups, groups[-1:])  # a child without another beside it
+    """(k,) groups of the nodes of the level above: the common group of both children, or -1."""
+    last = np.append(groups, groups[-1:])  # the last node may have one child only
     first, second = groups[0::2], last[1::2][: len(groups[0::2])]
     return np.where(first == second, first, -1)
 
 
 def _hubs(faces: Ints) -> Ints | None:
-    """(m,) groups of the triangles around each vertex that has very many, -1 for the others; None without such."""
+    """(m,) groups of triangles around the same very busy vertex, -1 for other triangles; None without such vertices."""
     around_each = np.bincount(faces.ravel())
     if around_each.max() <= _MOST_AROUND_A_VERTEX:
         return None
@@ -195,7 +213,7 @@ def _hubs(faces: Ints) -> Ints | None:
 
 
 def _children(pairs: Pairs, count: int) -> Pairs:
-    """Pairs of children, the smaller first, of pairs of nodes; a node may be paired with itself. ``count`` exist."""
+    """Pairs of children, smaller first, of pairs of nodes, which may be equal; the level has ``count`` children."""
     first, second = pairs
     itself = first == second
     one, other = 2 * first, 2 * second
@@ -216,7 +234,7 @@ def _without(pairs: Pairs, others: Pairs, count: int) -> Pairs:
 
 
 def _around_vertices(faces: Ints) -> Pairs:
-    """Pairs of triangles with a vertex in common, the smaller first, and each triangle with itself."""
+    """Pairs of triangles with a common vertex, smaller first, and each triangle with itself."""
     corners = faces.ravel()
     order = np.argsort(corners, kind="stable")
     triangles = order // 3
@@ -235,9 +253,9 @@ def _around_vertices(faces: Ints) -> Pairs:
 
 
 def halving_order(places: Floats) -> Ints:
-    """(m,) items so ordered that every node of the tree holds what is on one side of its parent's longest extent.
+    """(m,) order of items for the leaves of a tree whose nodes are halved across their longest extent.
 
-    ``places`` (d, m) are coordinates in as many dimensions as one likes.
+    ``places`` (d, m) are coordinates of any dimension d.
     """
     count = places.shape[1]
     order = np.arange(count)
@@ -247,7 +265,7 @@ def halving_order(places: Floats) -> Ints:
         extents = np.maximum.reduceat(places, starts, axis=1) - np.minimum.reduceat(places, starts, axis=1)
         node = np.arange(count) // size
         along = places[np.argmax(extents, axis=0)[node], np.arange(count)]
-        # One number, the node and the place in it, sorts faster than two.
+        # One combined key, the node plus the place in it, sorts faster than two keys.
         lowest = along.min()
         sorting = np.argsort(node + (along - lowest) / (2.0 * (along.max() - lowest) or 1.0))
         order, places = order[sorting], places[:, sorting]

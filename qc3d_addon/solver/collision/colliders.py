@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colliders: surfaces that in-betweens must not touch, and how far from them every vertex has to stay."""
+"""Colliders: surfaces that in-betweens must not enter, and the resolution of collisions with them."""
 
 from __future__ import annotations
 
@@ -18,23 +18,22 @@ from .box_tree import CrowdedError
 from .crossings import CrossingSearch
 from .surface_distance import SurfaceDistance
 
-# A vertex keeps at most this part of the mesh's mean edge from a collider, however far its keys are from it: enough for
-# the flat triangles between vertices.
+# Largest clearance of a vertex, in mean edges of the mesh, however far its keys are from the collider: enough that the
+# flat triangles between vertices stay out as well.
 _CLEARANCE = 0.25
-# Pushed out of one part of a collider, a vertex may be too near to another; seldom more often than this.
-_PUSHES = 4
+_PUSHES = 4  # pushed out of one part of a collider, a vertex may enter another; more rounds are rarely needed
 
 
 @dataclass(frozen=True, eq=False)
 class Collider:
-    """What must not be touched, at each key of a chain.
+    """A surface that in-betweens must not enter, given at each key of a chain.
 
     Parameters
     ----------
     shapes : (k, c, 3)
-        Positions at each of the chain's keys, in the keys' own coordinates.
+        Positions of its vertices at each of the chain's keys, in the keys' own coordinates.
     faces : (f, 3) int64
-        Triangles, normals pointing out.
+        Triangles with normals pointing out.
     """
 
     shapes: Floats
@@ -42,12 +41,12 @@ class Collider:
 
     @classmethod
     def checked(cls, shapes: ArrayLike, faces: ArrayLike) -> Collider:
-        """A collider from arrays of unknown origin.
+        """Validate arrays of any origin and make a collider of them.
 
         Raises
         ------
         InputError
-            If the arrays do not belong together or hold numbers that are none.
+            If shapes disagree, a coordinate is not finite, an index is out of range, or there are no triangles.
         """
         positions = np.asarray(shapes, dtype=np.float64)
         if positions.ndim != 3 or positions.shape[2] != 3:
@@ -63,13 +62,13 @@ class Collider:
 
     @classmethod
     def joined(cls, parts: Sequence[Collider]) -> Collider:
-        """One collider of several, all given at the same keys."""
+        """One collider made of several, all given at the same keys."""
         offsets = np.cumsum([0, *(part.shapes.shape[1] for part in parts[:-1])])
         faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=True)]
         return cls(np.concatenate([part.shapes for part in parts], axis=1), np.concatenate(faces))
 
     def at_keys(self, count: int) -> Collider:
-        """The collider for a chain of so many keys: one that is given once stays where it is.
+        """The collider for a chain of ``count`` keys; if it is given only once, it stays in place.
 
         Raises
         ------
@@ -84,19 +83,19 @@ class Collider:
 
     @property
     def moves(self) -> bool:
-        """Whether it is not the same at every key."""
+        """Whether its shape or place differs between keys."""
         return not bool((self.shapes == self.shapes[0]).all())
 
 
 
 class PosedCollider:
-    """A collider at the times of some frames of a chain.
+    """A collider at the times of a chain's frames.
 
     Parameters
     ----------
     collider : Collider
     frames : (k, c, 3)
-        Where it is at each time, in the keys' own coordinates.
+        Positions of its vertices in each frame, in the keys' own coordinates.
     """
 
     def __init__(self, collider: Collider, frames: Floats) -> None:
@@ -104,17 +103,17 @@ class PosedCollider:
         self._last: tuple[Floats, SurfaceDistance] | None = None
 
     def at_key(self, number: int) -> SurfaceDistance:
-        """Distances from the collider at a key of the chain."""
+        """Distances from the collider at the chain's key with this index."""
         return self._distances(self._collider.shapes[number])
 
     def at(self, index: int) -> SurfaceDistance:
-        """Distances from the collider in a frame."""
+        """Distances from the collider in the frame with this index."""
         return self._distances(self._frames[index])
 
     def crossings(self, frames: Floats, faces: Ints) -> list[int | None]:
-        """For each frame (k, n, 3) the pairs of triangles, one of the mesh and one of the collider, that cross.
+        """Number of crossing pairs of a triangle of the mesh and one of the collider, for each frame (k, n, 3).
 
-        None where so many lie over each other that the search is given up.
+        None for a frame in which so many triangles overlap that the search was given up.
         """
         if not len(frames):
             return []
@@ -132,24 +131,25 @@ class PosedCollider:
 
     def _distances(self, shape: Floats) -> SurfaceDistance:
         if self._last is None or not np.array_equal(self._last[0], shape):
-            self._last = (shape, SurfaceDistance(shape, self._collider.faces))  # fixed colliders need no more than one
+            self._last = (shape, SurfaceDistance(shape, self._collider.faces))  # reused if the collider is fixed
         return self._last[1]
 
 
 class CollisionResolver:
-    """Resolves collisions of the frames of one pair of keys with a collider.
+    """Resolves collisions of one pair's frames with a collider.
 
-    A vertex keeps the distance that its keys keep from the collider, interpolated, but never more than the flat
-    triangles between vertices need. One that a key itself has inside is let in as far as that.
+    Each vertex must keep the distance from the collider that is interpolated between its distances in the two keys,
+    but never more than a small clearance. If a key itself lies inside the collider, its depth is interpolated the same
+    way.
 
     Parameters
     ----------
     collider : PosedCollider
     pair : KeyPair
     number : int
-        Number of the pair in the chain.
-    members : (j,)
-        Which of the posed collider's frames the pair has.
+        Index of the pair in the chain.
+    members : (j,) int64
+        Indices, among the posed collider's frames, of the frames that belong to the pair.
     """
 
     def __init__(self, collider: PosedCollider, pair: KeyPair, number: int, members: Ints) -> None:
@@ -163,14 +163,31 @@ class CollisionResolver:
         self._rounding = 1e-9 * pair.diagonal
 
     def pushed(self, index: int, positions: Floats, time: float) -> tuple[Bools, Floats]:
-        """Which vertices (n, 3) of the pair's frame ``index`` are too near, and positions where they are not."""
+        """Move the vertices that are too close to the collider.
+
+        Parameters
+        ----------
+        index : int
+            Index of the frame among those of the pair.
+        positions : (n, 3)
+            Vertices of that frame, in the keys' own coordinates.
+        time : float
+            Time of the frame within the pair, 0..1.
+
+        Returns
+        -------
+        near : (n,) bool
+            Whether each vertex was too close.
+        moved : (n, 3)
+            Positions at the required distance for those, unchanged for the others.
+        """
         wanted = np.minimum((1.0 - time) * self._kept[0] + time * self._kept[1], self._most)
         found, place, normal = self._collider.at(int(self._members[index])).nearest(positions)
         near = found < wanted - self._rounding
         return near, np.where(near[:, None], place + wanted[:, None] * normal, positions)
 
     def cleared(self, index: int, positions: Floats, time: float, still: Bools) -> Floats:
-        """Positions (n, 3) of a frame with every vertex but the ``still`` ones (n,) pushed out, each by itself."""
+        """(n, 3) positions of a frame after all vertices but the ``still`` ones (n,) are pushed out individually."""
         for _ in range(_PUSHES):
             near, moved = self.pushed(index, positions, time)
             near &= ~still

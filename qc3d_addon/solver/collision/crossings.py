@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of triangles of one surface that cross each other."""
+"""Pairs of triangles of a surface that cross each other."""
 
 from __future__ import annotations
 
@@ -12,26 +12,32 @@ from ..arrays import Bools, Floats, Ints
 from ..triangles.geometry import cross_product
 from .box_tree import Budget, TriangleTree
 
-# Triangles that go through each other by less than this part of the surface's size touch.
-_TOUCHING = 1e-10
-_WORK_OF_A_TEST = 20  # of two triangles, as comparisons of two boxes
-_ODD = np.uint64(0x9E3779B97F4A7C15)  # multiplying by it scrambles: 2^64 over the golden ratio (Knuth 1973, 6.4)
+_TOUCHING = 1e-10  # triangles that intersect less deeply than this, relative to the surface's size, only touch
+_WORK_OF_A_TEST = 20  # the cost of testing two triangles, in comparisons of two boxes
+_ODD = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: multiplicative hashing (Knuth 1973, section 6.4)
 
 
 class CrossingSearch:
-    """Finds the pairs of triangles that cross, in any shape of one surface.
+    """Finds the pairs of triangles that cross, in any shape of a surface.
 
-    A triangle that is listed more than once, in whatever order of its corners, counts as the first of these.
+    Of triangles that are listed several times, in whatever order of their corners, only the first counts.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        Triangles.
     shapes : sequence of (n, 3)
-        Shapes that the surface takes, such as its two keys: the search is quick near these.
+        Typical shapes, such as the two keys; the search is fast for shapes like these.
     moving : (m,) bool, optional
-        Only pairs are looked for of which at least one triangle is among these.
+        Only pairs with at least one of these triangles are searched; all by default.
     sides : (m,) bool, optional
-        Which of two surfaces each triangle belongs to: only pairs across both are looked for.
+        Which of two surfaces each triangle belongs to; then only pairs of a triangle of each are searched.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [0.6, 0.5, 1]])
+    >>> CrossingSearch(np.array([[0, 1, 2], [3, 4, 5]]), [points]).pairs(points)
+    array([[0, 1]])
     """
 
     def __init__(
@@ -55,12 +61,13 @@ class CrossingSearch:
 
         Returns
         -------
-        (k, 2) int64, smaller index first, sorted.
+        (k, 2) int64
+            Sorted pairs, smaller index first.
 
         Raises
         ------
         CrowdedError
-            If so many triangles lie over each other that comparing them would take too long.
+            If so many triangles overlap that comparing them would take too long.
         """
         if self._tree is None:
             return np.empty((0, 2), dtype=np.int64)
@@ -68,7 +75,7 @@ class CrossingSearch:
         one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
         low, high = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
         depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
-        # What is smaller than the depth crosses nothing: the thousands of triangles of a part that is a point, say.
+        # Triangles smaller than the depth cannot cross: for example those of a part that is squashed to a point.
         tiny = np.flatnonzero(high[0] - low[0] <= 0.5 * depth)
         if len(tiny):
             low[:, tiny[(high[:, tiny] - low[:, tiny] <= 0.5 * depth).all(axis=0)]] = np.inf
@@ -86,13 +93,13 @@ class CrossingSearch:
 
 
 def crossing_pairs(points: Floats, faces: Ints, moving: Bools | None = None) -> Ints:
-    """Pairs of triangles (k, 2) that cross in one shape (n, 3); see ``CrossingSearch``."""
+    """(k, 2) pairs of triangles that cross in a single shape ``points`` (n, 3); see ``CrossingSearch``."""
     return CrossingSearch(faces, [points], moving).pairs(points)
 
 
 def _listed_once(faces: Ints) -> Ints | None:
-    """(k,) the triangles without repetitions, ascending; None where nothing is repeated."""
-    # Sums of scrambled numbers tell in no time, whatever the order of the corners, that no triangle is repeated.
+    """(k,) indices of the triangles without repetitions, ascending; None if no triangle is repeated."""
+    # Sums of hashed indices, independent of the order of the corners, quickly rule out repetitions.
     scrambled = np.arange(int(faces.max(initial=-1)) + 1, dtype=np.uint64) * _ODD
     scrambled = (scrambled ^ scrambled >> np.uint64(29)) * _ODD
     sums = np.sort(scrambled[faces[:, 0]] + scrambled[faces[:, 1]] + scrambled[faces[:, 2]])
@@ -103,7 +110,7 @@ def _listed_once(faces: Ints) -> Ints | None:
 
 
 def _share_a_vertex(first: Ints, second: Ints) -> Bools:
-    """(k,) whether triangles (k, 3) have a corner in common."""
+    """(k,) whether triangles (k, 3) have a common vertex."""
     shared = np.zeros(len(first), dtype=bool)
     for corner in first.T:
         for other in second.T:
@@ -112,14 +119,14 @@ def _share_a_vertex(first: Ints, second: Ints) -> Bools:
 
 
 def _cross(first: Floats, second: Floats, depth: float) -> Bools:
-    """(k,) whether triangles cross deeper than ``depth``: an edge of one goes through the inside of the other.
+    """(k,) whether triangles cross by more than ``depth``: an edge of one passes through the inside of the other.
 
-    Triangles are (3, 3, k), by coordinate and corner.
+    Triangles are component-major, (3, 3, k): coordinate, corner, triangle.
     """
     result = np.zeros(first.shape[2], dtype=bool)
     near = np.arange(first.shape[2])
     pair = (first, second)
-    # A triangle on one side of the other's plane is apart from it; few are left for the second plane.
+    # Triangles do not cross if one lies on one side of the other's plane; few pairs are left for the second plane.
     for _ in range(2):
         pair = (pair[1], pair[0])
         heights = _heights(*pair, depth)
@@ -131,7 +138,7 @@ def _cross(first: Floats, second: Floats, depth: float) -> Bools:
 
 
 def _heights(triangles: Floats, others: Floats, depth: float) -> Floats:
-    """(3, k) of the corners of ``others`` over the planes of ``triangles``; zero where that is no depth."""
+    """(3, k) scaled heights of the corners of ``others`` over the planes of ``triangles``; 0 if less than ``depth``."""
     along, across = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     normals = cross_product(along, across)
     size, *reaches = (np.sqrt((vectors**2).sum(axis=0)) for vectors in (normals, along, across))
@@ -139,14 +146,14 @@ def _heights(triangles: Floats, others: Floats, depth: float) -> Floats:
     for corner in range(3):
         offsets = others[:, corner] - triangles[:, 0]
         height = (offsets * normals).sum(axis=0)
-        # What moving every corner by the depth can change: in one plane only rounding would decide.
+        # The most that the height changes if all corners move by the depth. Below it, rounding would decide.
         change = size + np.sqrt((offsets**2).sum(axis=0)) * (reaches[0] + reaches[1])
         heights[corner] = np.where(np.abs(height) <= depth * change, 0.0, height)
     return heights
 
 
 def _pierced(triangles: Floats, others: Floats, depth: float) -> Bools:
-    """(k,) whether an edge of ``others`` goes through the inside of ``triangles``, all (3, 3, k)."""
+    """(k,) whether an edge of ``others`` passes through the inside of ``triangles``, all (3, 3, k)."""
     heights = _heights(triangles, others, depth)
     result = np.zeros(len(heights[0]), dtype=bool)
     for start in range(3):
@@ -161,5 +168,5 @@ def _pierced(triangles: Floats, others: Floats, depth: float) -> Bools:
 
 
 def _orientation(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
-    """(k,) six times the signed volumes of the tetrahedra with corners a, b, c, d, each (3, k)."""
+    """(k,) six times the signed volume of tetrahedra with corners a, b, c, d, each (3, k)."""
     return np.asarray(((d - a) * cross_product(b - a, c - a)).sum(axis=0))

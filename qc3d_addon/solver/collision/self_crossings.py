@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens that cross themselves more than their keys do: where, and how far around the cure should reach."""
+"""In-betweens that cross themselves more than their keys do: where they do, and how far around the re-solve reaches."""
 
 from __future__ import annotations
 
@@ -15,27 +15,30 @@ from ..triangles.topology import sides
 from .box_tree import CrowdedError
 from .crossings import CrossingSearch
 
-# The cure fades over so many rings of neighbours around the crossing triangles.
+# Stronger anchors fade out over this many rings of neighbors around crossing triangles: an abrupt end would show as a
+# crease.
 _FADING_RINGS = 4
 
 
 class CrossingLimit:
-    """How much a surface may cross itself between its keys: no more than the worse of them.
+    """How much a surface may cross itself between two keys: no more than the worse of the keys.
 
-    Nothing is known of shapes in which so many triangles lie over each other that the search is given up, and of none
-    where that is a key.
+    The crossings of a shape are unknown if so many of its triangles overlap that the search is given up. If that
+    happens for a key, they are unknown for all shapes.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        Triangles.
     key0, key1 : (n, 3)
+        Positions in the two keys.
     still : (n,) bool
-        Vertices that are in the same place in both keys and all shapes.
+        Vertices that have the same place in both keys and in all shapes.
     """
 
     def __init__(self, faces: Ints, key0: Floats, key1: Floats, still: Bools) -> None:
         self._faces = faces
-        # Where neither triangle moves, nothing changes between the keys.
+        # Two triangles that do not move cross in all shapes or in none.
         self._search = CrossingSearch(faces, (key0, key1), ~still[faces].all(axis=1))
         self._known: Ints | None = None
         self._allowed = 0
@@ -47,7 +50,7 @@ class CrossingLimit:
         self._allowed = max(len(codes) for codes in in_keys)
 
     def excess(self, shape: Floats) -> int | None:
-        """Crossing pairs of triangles of ``shape`` (n, 3) beyond what the keys have; None where that is not known."""
+        """How many more pairs of triangles cross in ``shape`` (n, 3) than in the worse key; None if unknown."""
         if self._known is None:
             return None
         try:
@@ -56,7 +59,10 @@ class CrossingLimit:
             return None
 
     def new_vertices(self, shape: Floats) -> Bools:
-        """(n,) corners of triangles that cross in ``shape`` (n, 3) and in neither key; none within the limit."""
+        """(n,) whether each vertex belongs to triangles that cross in ``shape`` (n, 3) but in neither key.
+
+        All false if the shape does not cross itself more than the worse key, or if its crossings are unknown.
+        """
         found = np.zeros(len(shape), dtype=bool)
         if self._known is None:
             return found
@@ -71,7 +77,7 @@ class CrossingLimit:
         return found
 
     def faded(self, chosen: Bools) -> Floats:
-        """(n,) 1 at the chosen vertices, falling to 0 a few rings of neighbours away."""
+        """(n,) weights that are 1 at the chosen vertices and fall to 0 a few rings of neighbors away."""
         edges = sides(self._faces)
         count = len(chosen)
         neighbours = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
@@ -84,23 +90,23 @@ class CrossingLimit:
 
     @staticmethod
     def left(excess: Sequence[int | None]) -> tuple[int, int]:
-        """What is left to do in several shapes: in how many nothing is known, and the pairs that cross in the others.
-
-        The smaller, the better.
-        """
+        """Badness of several shapes, for comparison: how many are unknown, and the total excess of the others."""
         return excess.count(None), sum(count or 0 for count in excess)
 
     def _codes(self, shape: Floats) -> Ints:
-        """One number for each crossing pair of triangles of which one moves."""
+        """One code for each crossing pair of triangles of which at least one moves."""
         pairs = self._search.pairs(shape)
         return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])
 
 
 class PairCrossings:
-    """How often shapes between two keys cross themselves beyond the worse key, in the keys' coordinates of any size."""
+    """Counts how much more often shapes between two keys cross themselves than the worse key does.
+
+    Shapes are in the keys' own coordinates, which may be of any size.
+    """
 
     def __init__(self, pair: KeyPair) -> None:
-        # In units in which cubes of coordinates are numbers; powers of two lose nothing.
+        # Scaled so that cubes of coordinates neither overflow nor underflow; scaling by powers of two is exact.
         size = max(float(np.ptp(0.5 * key, axis=0).max()) for key in (pair.key0, pair.key1))
         self._exponent = -int(np.frexp(size)[1])
         self._origin = np.ldexp(pair.key0[0], self._exponent)
@@ -108,7 +114,7 @@ class PairCrossings:
         self._limit = CrossingLimit(pair.welded_faces, self._scaled(pair.key0), self._scaled(pair.key1), still)
 
     def excess(self, shape: Floats) -> int | None:
-        """Crossing pairs of triangles of ``shape`` (n, 3) beyond what the keys have; None where that is not known."""
+        """How many more pairs of triangles cross in ``shape`` (n, 3) than in the worse key; None if unknown."""
         return self._limit.excess(self._scaled(shape))
 
     def _scaled(self, positions: Floats) -> Floats:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Signed distances from a triangle mesh: how far outside or inside points are, and the nearest point of the surface."""
+"""Exact signed distances from a triangle mesh, and the nearest points on it."""
 
 from __future__ import annotations
 
@@ -14,30 +14,37 @@ from ..triangles.geometry import areas, face_normals
 from ..triangles.topology import sides, welded
 from .box_tree import halving_order
 
-# Every node of the tree of triangles has so many children.
-_FAN = 4
-# Points that are worked on at once, so that what belongs to them stays in the processor's cache.
-_BLOCK = 1_000
+_FAN = 4  # children of each node of the tree: with fewer, numpy is called on too many levels
+_BLOCK = 1_000  # queries processed at once: their temporary arrays stay in the processor's cache
 
 
 class SurfaceDistance:
-    """Exact distances from one triangle mesh.
+    """Exact signed distances from a triangle mesh.
 
     Parameters
     ----------
     points : (c, 3)
-    faces : (f, 3)
-        Triangles whose normals point out; an open surface is outside on the side of its normals.
+        Vertices.
+    faces : (f, 3) int64
+        Triangles with normals pointing out. The outside of an open surface is the side of its normals.
+
+    Examples
+    --------
+    >>> floor = np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]])
+    >>> distance, place, normal = SurfaceDistance(floor, np.array([[0, 1, 2]])).nearest(np.array([[0, 0, -2.0]]))
+    >>> distance
+    array([-2.])
     """
 
     def __init__(self, points: Floats, faces: Ints) -> None:
-        # Where copies of a vertex meet, the triangles of all of them decide which side is outside.
+        # At coincident vertices, the triangles of all of them decide which side is outside.
         vertices, group = welded(points, points)
         points, faces = points[vertices], group[faces]
         faces = faces[areas(points, faces) > 0.0]
         corners = points[faces]
         centers = corners.mean(axis=1)
-        # Large triangles get branches of their own: among small ones they would spoil the bounds.
+        # The size as an extra coordinate: large triangles get branches of their own, because they would loosen the
+        # bounds of small ones.
         radii = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
         faces = faces[halving_order(np.column_stack([centers, radii]).T)]
         normals = face_normals(points, faces)
@@ -54,18 +61,18 @@ class SurfaceDistance:
             self._levels.insert(0, _Slabs.around(corners, normals, size))
 
     def nearest(self, queries: Floats) -> tuple[Floats, Floats, Floats]:
-        """Where points (q, 3) are.
+        """Signed distances and nearest points of the surface for points (q, 3).
 
         Returns
         -------
         distance : (q,)
-            Positive outside, negative inside. The side is that of the angle-weighted pseudonormal of the nearest face,
-            edge or vertex, which is right on every closed surface (Baerentzen & Aanaes 2005, "Signed distance
+            Positive outside, negative inside. The sign is that of the angle-weighted pseudonormal of the nearest face,
+            edge or vertex, which is correct for every closed surface (Baerentzen & Aanaes 2005, "Signed distance
             computation using the angle weighted pseudonormal").
         place : (q, 3)
-            The nearest point of the surface.
+            Nearest point on the surface.
         normal : (q, 3)
-            The surface's unit normal there, interpolated between vertices.
+            Unit normal of the surface there, interpolated between vertices.
         """
         triangle, weight = np.empty(len(queries), dtype=np.int64), np.empty((len(queries), 3))
         for start in range(0, len(queries), _BLOCK):
@@ -80,9 +87,9 @@ class SurfaceDistance:
         return np.where(side < 0.0, -1.0, 1.0) * np.linalg.norm(apart, axis=1), place, normal
 
     def _closest(self, queries: Floats) -> tuple[Ints, Floats]:
-        """The triangle (q,) nearest to each query (q, 3), and the barycentric weights (q, 3) of the nearest point.
+        """The nearest triangle (q,) to each query (q, 3), and the barycentric weights (q, 3) of the nearest point.
 
-        Down the tree, level by level, nodes that are surely farther than others are left out.
+        Branch and bound, level by level, for all queries at once.
         """
         places = np.ascontiguousarray(queries.T)
         query, node = np.arange(len(queries)), np.zeros(len(queries), dtype=np.int64)
@@ -106,11 +113,11 @@ class SurfaceDistance:
         return node[best], weights[best]
 
     def _pseudonormals(self, triangles: Ints, weights: Floats) -> Floats:
-        """(q, 3) normals of the face, edge or vertex that a point with these barycentric weights lies on."""
+        """(q, 3) pseudonormals of the face, edge or vertex that a point with these barycentric weights lies on."""
         normals: Floats = self._face_normals[triangles]
         is_zero = weights == 0.0
         for corner in range(3):
-            # Across from the corner is the side from the next corner on.
+            # The side opposite a corner starts at the next corner.
             rows = np.flatnonzero(is_zero[:, corner])
             normals[rows] = self._edge_normals[self._edge_of_side[(corner + 1) % 3, triangles[rows]]]
         for corner in range(3):
@@ -120,10 +127,10 @@ class SurfaceDistance:
 
 
 class _Slabs(NamedTuple):
-    """Flat cylinders around groups of neighbouring triangles: what is nearly flat is bounded closely, however it lies.
+    """Bounding cylinders of groups of neighboring triangles; they bound nearly flat groups tightly in any orientation.
 
-    Component-major, so that inner loops are contiguous: ``middles`` and ``axes`` are (3, k), ``radii`` and ``heights``
-    (half of them) (k,), ``members`` (3, k) a point of the surface in each.
+    Component-major, so that inner loops are contiguous: centers ``middles`` (3, k), unit ``axes`` (3, k), ``radii``
+    (k,), half ``heights`` (k,), and ``members`` (3, k), a point of the surface in each group.
     """
 
     middles: Floats
@@ -134,8 +141,7 @@ class _Slabs(NamedTuple):
 
     @classmethod
     def around(cls, corners: Floats, normals: Floats, size: int) -> _Slabs:
-        """Around every ``size`` triangles that follow each other, by their corners (3, 3, f), the coordinate first, and
-        their normals (3, f)."""
+        """Around each run of ``size`` triangles with corners (3, 3, f), coordinate first, and normals (3, f)."""
         count = corners.shape[2]
         starts = np.arange(0, count, size)
         group = np.arange(count) // size
@@ -149,14 +155,14 @@ class _Slabs(NamedTuple):
         along = x * u + y * v + z * w
         lowest, highest = _extremes(along, starts)
         across = np.sqrt(_extremes(np.maximum(x * x + y * y + z * z - along * along, 0.0), starts)[1])
-        # A little more than needed, so that rounding leaves nothing out.
+        # Slightly enlarged against rounding.
         slack = 1e-9 * (across + highest - lowest)
         members = corners[:, :, starts + np.diff(starts, append=count) // 2].mean(axis=1)
         middles = middles + 0.5 * (lowest + highest) * axes
         return cls(middles, axes, across + slack, 0.5 * (highest - lowest) + slack, members)
 
     def bounds(self, queries: Floats, node: Ints) -> tuple[Floats, Floats]:
-        """(k,) squared distances that the nearest point in a node is not below, and not above, for queries (3, k)."""
+        """(k,) lower and upper bounds of squared distances from queries (3, k) to the surface in their nodes (k,)."""
         x, y, z = queries - self.middles[:, node]
         u, v, w = self.axes[:, node]
         along = x * u + y * v + z * w
@@ -168,14 +174,14 @@ class _Slabs(NamedTuple):
 
 
 def _extremes(values: Floats, starts: Ints) -> tuple[Floats, Floats]:
-    """(..., k) least and largest of three rows of values (3, ..., f) in each group of columns."""
+    """(..., k) minimum and maximum of values (3, ..., f), over the first axis and over each group of columns."""
     first, second, third = values
     least, most = np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
     return np.minimum.reduceat(least, starts, axis=-1), np.maximum.reduceat(most, starts, axis=-1)
 
 
 def _vertex_normals(points: Floats, faces: Ints, normals: Floats) -> Floats:
-    """(c, 3) unit normals of the vertices, each triangle's unit normal (f, 3) weighted by its angle there."""
+    """(c, 3) unit vertex normals: the triangles' unit normals (f, 3) weighted by their angles at the vertex."""
     corners = points[faces]
     total = np.zeros_like(points)
     for corner in range(3):
@@ -186,7 +192,7 @@ def _vertex_normals(points: Floats, faces: Ints, normals: Floats) -> Floats:
 
 
 def _closest_weights(queries: Floats, corners: Floats) -> Floats:
-    """(..., 3) barycentric weights of the point of each triangle (..., 3, 3) nearest to a query (..., 3)."""
+    """(..., 3) barycentric weights of the point nearest to each query (..., 3) in its triangle (..., 3, 3)."""
     a, b, c = (corners[..., corner, :] for corner in range(3))
     along, across, offset = b - a, c - a, queries - a
     d00, d01, d11 = _dot(along, along), _dot(along, across), _dot(across, across)
@@ -195,7 +201,7 @@ def _closest_weights(queries: Floats, corners: Floats) -> Floats:
     v, w = (d11 * d20 - d01 * d21) / determinant, (d00 * d21 - d01 * d20) / determinant
     weights = np.stack([1.0 - v - w, v, w], axis=-1)
     outside = (weights < 0.0).any(axis=-1)
-    # Beyond an edge: the nearest point of the three edges.
+    # If the foot of the perpendicular is outside, the nearest point is on one of the edges.
     edges = []
     for first, second in ((0, 1), (1, 2), (2, 0)):
         start, end = corners[..., first, :], corners[..., second, :]

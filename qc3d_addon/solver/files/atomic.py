@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outputs, all of them: looked at before the work, written in private, and put in their places whole or not at all."""
+"""Output files: checked before the work, written in a private place, and moved into place completely or not at all."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from ..errors import InputError, with_remedy
 from .private_folders import PrivateFolder
 from .replacement import NO_FILE, alone_in, inherit, put_back, require_replaceable, set_aside
 
-_LONGEST_SUFFIX = 50  # characters; no format has a longer one
+_LONGEST_SUFFIX = 50  # characters; no format has a longer suffix
 
 
 def require_writable(*paths: Path, inputs: Iterable[Path | None] = ()) -> None:
-    """Check, before any work, that files can be written; nothing is left there.
+    """Check, before any work, that files can be written. Leaves nothing behind.
 
     Parameters
     ----------
     paths : Path
-        The files. A link is followed, as by other programs.
+        The output files. Links are followed.
     inputs : iterable of Path or None, optional
-        Files that are read and must stay as they are.
+        Input files, which must not be overwritten.
 
     Raises
     ------
     InputError
-        If one is a folder, a device, a pipe or a socket, may not be written, or is named twice.
+        If an output is a folder, device, pipe or socket, cannot be written, or is named twice.
     """
     targets = _targets(paths, [path for path in inputs if path is not None])
     for path, target in zip(paths, targets, strict=True):
@@ -41,12 +41,12 @@ def require_writable(*paths: Path, inputs: Iterable[Path | None] = ()) -> None:
 
 
 def require_writable_in(folder: Path, names: Iterable[str], inputs: Iterable[Path | None] = ()) -> None:
-    """As ``require_writable`` for files in a folder that need not be there yet.
+    """As ``require_writable``, for files in a folder that need not exist yet.
 
     Raises
     ------
     InputError
-        As ``require_writable``, and if there is something else in the folder's place.
+        As ``require_writable``, and if the folder's path is something else.
     """
     with _as_input_error(folder, _NO_FOLDER):
         missing = _missing(folder)
@@ -60,33 +60,34 @@ def require_writable_in(folder: Path, names: Iterable[str], inputs: Iterable[Pat
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """As ``replacing_all`` for one file."""
+    """As ``replacing_all``, for one file."""
     with replacing_all(path) as (new,):
         yield new
 
 
 @contextmanager
 def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
-    """Give absolute names to write files to, which all take the places of ``paths`` when the block ends well.
+    """Context manager that gives temporary absolute paths to write to; at the end, the files replace ``paths``.
 
-    There are no files of these names yet, and nobody else can put any there. Leaving by an error removes what was
-    written and keeps what was there; an OSError becomes one sentence. A file that is replaced keeps its mode and its
-    access lists, and its owner where this user may give files away. Processes that replace several files in the same
-    folder at the same time wait for each other, but not for long: that each file is whole matters more than that all
-    are from the same process.
+    All files are replaced or none. No files exist at the temporary paths, and no one else can create any there. If the
+    block raises, the new files are removed and the old ones stay; an OSError becomes a one-sentence InputError. The new
+    file gets the mode and access lists of the one that it replaces, and its owner if this user may give files away.
+
+    Processes that replace several files in the same folder at the same time wait for each other, but only briefly: it
+    matters more that each file is complete than that all of them come from the same process.
 
     Parameters
     ----------
     paths : Path
-        The files. A link is followed, as by other programs.
+        The output files. Links are followed.
     beside : bool
-        Whether the new files are to lie in the folders where they will stay, for formats that name other files
-        relative to their own place, such as .blend; else they are in folders of their own.
+        Whether to write the new files in the folders where they will stay. Formats such as .blend need that, because
+        they name other files relative to their own place. By default they are written in private folders.
 
     Raises
     ------
     InputError
-        As ``require_writable``, and if a file cannot be written or put in its place; nothing was written then.
+        As ``require_writable``, and if a file cannot be written or moved into place; then nothing has changed.
     """
     targets = _targets(paths, ())
     with ExitStack() as stack:
@@ -116,7 +117,7 @@ def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
 
 @contextmanager
 def making_folder(path: Path) -> Iterator[None]:
-    """Make a folder, and those above it, where there is none; leaving by an error removes what was made.
+    """Context manager that makes a folder and its parents if needed; an error in the block removes what was made.
 
     Raises
     ------
@@ -136,10 +137,10 @@ def making_folder(path: Path) -> Iterator[None]:
 
 
 def require_room(path: Path, size: int) -> None:
-    """Check that ``size`` bytes can be written in the place of ``path``, by writing as many for a moment.
+    """Check that ``size`` bytes can be written next to ``path``, by writing them and removing them again.
 
-    For programs that do not find out by themselves that a disk is full. To write them finds more than to ask how much
-    room there is: quotas, limits, and disks that do not tell.
+    For programs that do not notice that a disk is full. Asking for the free space would miss quotas, limits, and disks
+    that do not report it.
 
     Raises
     ------
@@ -147,7 +148,7 @@ def require_room(path: Path, size: int) -> None:
         If they cannot be written.
     """
     (target,) = _targets([path], ())
-    block = os.urandom(2**20)  # nothing that a file system could compress
+    block = os.urandom(2**20)  # random, so that no file system can compress it
     with (
         _as_input_error(path, _UNWRITTEN),
         PrivateFolder(target.parent) as folder,
@@ -172,7 +173,7 @@ def _as_input_error(what: Path | str, problem: str) -> Iterator[None]:
 
 
 def _targets(paths: Sequence[Path], inputs: Sequence[Path]) -> list[Path]:
-    """Where files will be, links followed; raises InputError where one is no file, or named twice."""
+    """The output files with links resolved; InputError if one is not an ordinary file or is named twice."""
     seen: dict[object, int] = {key: -1 for path in inputs for key in _identities(path)}
     targets = []
     for number, path in enumerate(paths):
@@ -192,12 +193,12 @@ def _targets(paths: Sequence[Path], inputs: Sequence[Path]) -> list[Path]:
 
 
 def _identities(path: Path) -> list[object]:
-    """What two names of the same file have in common: where links lead, and the number of what is there."""
+    """What two names of the same file have in common: the resolved path, and the device and inode numbers."""
     found: list[object] = []
-    with suppress(OSError, ValueError):  # said where it is read or written
+    with suppress(OSError, ValueError):  # reported when it is read or written
         found.append(os.path.normcase(os.path.realpath(path)))
         status = path.stat()
-        if status.st_ino:  # not every file system has numbers
+        if status.st_ino:  # some file systems have no inode numbers
             found.append((status.st_dev, status.st_ino))
     return found
 
@@ -211,7 +212,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _missing(folder: Path) -> list[Path]:
-    """The folders that have to be made, the last one first."""
+    """The folders that do not exist yet, innermost first."""
     found = []
     while not _is_there(folder):
         found.append(folder)
@@ -220,13 +221,13 @@ def _missing(folder: Path) -> list[Path]:
 
 
 def _require_whole(path: Path, new: Path, folder: Path) -> None:
-    """Check that there is one file, all of it on the disk."""
+    """Check that a single file was written, and that all of it has reached the disk."""
     if not new.is_file():
         raise InputError(f"{path} was not written; choose another format or place.")
     if new.parent == folder and len(list(folder.iterdir())) > 2:  # the file, and the folder's mark
         raise InputError(f"{path} cannot be written: its format takes several files; choose another one.")
     with new.open("r+b") as file:
-        os.fsync(file.fileno())  # some disks say no earlier that they are full
+        os.fsync(file.fileno())  # some disks do not report any earlier that they are full
 
 
 def _remove_if_empty(folder: Path) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Archives of arrays, read without trusting them."""
+"""Reads .npz archives from untrusted sources, and writes them."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, reason, remedy_of_limit
 
-# All that reading a damaged or hostile archive has been seen to raise: truncated, corrupt, encrypted, absurd headers.
+# Everything that reading truncated, corrupt, encrypted or hostile archives was seen to raise, mostly by fuzzing.
 _UNREADABLE = (
     OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, LookupError, TypeError, AttributeError,
     SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-MOST_BYTES = 2**31  # of a file that is read, of an array in it, and of all arrays that are read together
-_MOST_DIRECTORY = 2**22  # bytes of the list of an archive's arrays, which is held ten times over
-_MOST_HEADER = 2**14  # bytes of the header of an array; numpy itself reads no more than 10,000
-_LEAST_HELD = 8  # bytes of each number of an array: most are made floating-point numbers
+MOST_BYTES = 2**31  # limit for a file, for an array in it, and for all arrays that are read together
+_MOST_DIRECTORY = 2**22  # bytes of an archive's directory, which takes about ten times as much when parsed
+_MOST_HEADER = 2**14  # bytes of an array's header; numpy itself reads at most 10,000
+_LEAST_HELD = 8  # bytes counted for each number: most arrays are converted to double precision
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:
-    """Write arrays to an .npz file, as ``np.savez`` does; of an error nothing is left, no open file and no warning.
+    """Write arrays to an .npz file. Unlike ``np.savez``, an error leaves no open file and no warning behind.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: 
 
 
 class Header(NamedTuple):
-    """What an array says of itself before it is read.
+    """The header of an array, known before the array is read.
 
     Parameters
     ----------
@@ -64,35 +64,36 @@ class Header(NamedTuple):
 
     @property
     def held(self) -> int:
-        """Bytes that the array takes, or that it would take as 64-bit numbers where that is more."""
+        """Bytes of memory that the array takes, counting at least 8 for each number."""
         return math.prod(self.shape) * max(self.dtype.itemsize, _LEAST_HELD)
 
     @property
     def rows(self) -> int:
-        """Its length; 0 of a single number."""
+        """Length of the first axis; 0 for a scalar."""
         return self.shape[0] if self.shape else 0
 
 
 class Archive:
-    """The arrays of an .npz file that is open. Nothing is allocated before headers and sizes have been looked at.
+    """The arrays of an open .npz file. Headers and sizes are checked before anything is allocated.
 
     Parameters
     ----------
     file : BinaryIO
+        The open file.
     what : str or Path
-        What errors call it.
+        Name of the file for error messages.
     needed : str
-        What it should hold, for errors.
+        What the file should contain, for error messages.
 
     Raises
     ------
     InputError
-        If it is no such archive, or holds a name twice or something that is no array.
+        If it is not an .npz archive, or contains a name twice or something that is not an array.
 
     Attributes
     ----------
     names : tuple of str
-        Of its arrays.
+        Names of its arrays.
     """
 
     def __init__(self, file: BinaryIO, what: Path | str, needed: str) -> None:
@@ -118,12 +119,13 @@ class Archive:
         return name in self._entries
 
     def headers(self, names: Iterable[str]) -> dict[str, Header]:
-        """What arrays that are to be read say of themselves, by their names.
+        """The headers of the given arrays, by name.
 
         Raises
         ------
         InputError
-            If one is not there, is not as large as it says, or could not be read; or if they are too much together.
+            If an array is missing or cannot be read, if its size does not match its header, or if the arrays together
+            are too large.
         """
         found = {name: self._header(name) for name in names}
         held = sum(header.held for header in found.values())
@@ -135,7 +137,7 @@ class Archive:
         return found
 
     def read(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-        """Arrays by their names; raises InputError as ``headers`` does."""
+        """The given arrays by name; raises InputError as ``headers`` does."""
         return {name: self._array(name) for name in self.headers(names)}
 
     def _header(self, name: str) -> Header:
@@ -156,14 +158,14 @@ class Archive:
     def _reading(self, name: str) -> Iterator[None]:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of headers in the words of other versions
+                warnings.simplefilter("ignore")  # numpy warns of headers written by other versions
                 yield
         except _UNREADABLE as error:
             raise unreadable(f"The array {name} in {self._what}", error) from error
 
 
 class _ListedFirst:
-    """A file of which, while an archive's list of entries is read, no more than that may be is read at once."""
+    """A file that refuses to read more than ``most`` bytes at once, while an archive's directory is read."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -180,12 +182,12 @@ class _ListedFirst:
 
 @contextmanager
 def open_archive(path: Path, needed: str) -> Iterator[Archive]:
-    """Open an .npz file of arrays, without pickled objects; ``needed`` says what it should hold.
+    """Open an .npz file of arrays without pickled objects; ``needed`` says what it should contain, for error messages.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is something else.
+        If the file cannot be read or is not an .npz file.
     """
     require_file(path)
     try:
@@ -198,12 +200,12 @@ def open_archive(path: Path, needed: str) -> Iterator[Archive]:
 
 
 def require_file(path: Path, most: int = MOST_BYTES) -> None:
-    """Check a name before it is opened: pipes and devices may never end.
+    """Check that a path is an ordinary file before it is opened: reading a pipe or device may never end.
 
     Raises
     ------
     InputError
-        If there is no ordinary file of that name, or it is larger than any file should be that is read here.
+        If there is no ordinary file of that name, or if it is larger than ``most`` bytes.
     """
     try:
         found = path.stat()
@@ -216,15 +218,16 @@ def require_file(path: Path, most: int = MOST_BYTES) -> None:
 
 
 def unreadable(what: Path | str, error: BaseException) -> InputError:
-    """The error to raise where reading failed."""
+    """The error to raise when reading fails, with a remedy."""
     remedy = remedy_of_limit(error) or "export it again, or name another file"
     return InputError(f"{what} cannot be read: {reason(error)}; {remedy}.")
 
 
 def _checked_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
-    """What an array says of itself; ValueError unless it is as large as its entry says, and of a size that is read."""
+    """Read an array's header; ValueError if it does not match the size of its entry or exceeds the limits."""
     npy: Any = npy_format  # without types in some versions
-    # Other methods are not asked how much they make of little, and LZMA is told how much memory to take.
+    # Other compression methods may expand to any size without warning, and an LZMA header decides how much memory is
+    # allocated.
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError("it is compressed by a method that numpy does not write")
     if entry.file_size > MOST_BYTES:

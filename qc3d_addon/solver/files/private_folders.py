@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders that only this process uses: gone when it is done with them, swept by a later one where it was killed."""
+"""Folders that only this process uses; if it is killed before it removes one, a later process does."""
 
 from __future__ import annotations
 
@@ -28,20 +28,21 @@ _LONGEST_MARK = 10_000  # bytes
 
 
 class PrivateFolder:
-    """A new folder that only this user can enter, removed by ``close``; on Windows whoever may enter ``parent`` can.
+    """A new folder that only this user can enter, removed by ``close``. On Windows, its access is that of ``parent``.
 
-    Its name proves that it was made here, by this user, in this place: no other folder, no copy and no folder that was
-    moved has such a name. A file in it, the mark, is locked while the folder is in use. The system frees the lock when
-    the process ends, however that happens; every new folder first removes those beside it that nobody uses any more.
+    Its name proves that this user made it in this place: no other folder, no copy and no moved folder has such a name.
+    A file in it, the mark, is locked while the folder is in use. The system releases the lock when the process ends,
+    however that happens, and making a new folder first removes abandoned ones next to it.
 
     Parameters
     ----------
     parent : Path, optional
-        Where it is made; by default in the system's folder for temporary files.
+        Where the folder is made; by default in the system's folder for temporary files.
 
     Attributes
     ----------
     path : Path
+        The folder.
 
     Raises
     ------
@@ -55,12 +56,12 @@ class PrivateFolder:
         remove_abandoned(parent)
         start = f"{PREFIX}{secrets.token_hex(8)}"
         self.path = Path(os.path.abspath(parent)) / f"{start}{_proof(start, parent)}"
-        # On Windows a file keeps the access rights of the folder that it was made in when it is moved elsewhere.
+        # On Windows, a file that is moved keeps the access rights of the folder in which it was made.
         self.path.mkdir(0o777 if sys.platform == "win32" and not is_temporary else 0o700)
         self._mark: BinaryIO | None = None
         try:
             self._mark = (self.path / _MARK).open("x+b", buffering=0)
-            _lock(self._mark)  # before it says anything: whoever finds the sentence unlocked may remove the folder
+            _lock(self._mark)  # before writing: a sweep removes folders whose mark has the sentence but no lock
             _write_whole(self._mark, _SENTENCE)
         except BaseException:
             self.close()
@@ -73,9 +74,9 @@ class PrivateFolder:
         self.close()
 
     def beside(self, suffix: str) -> Path:
-        """A name that nobody can guess for a file next to the folder, removed with it.
+        """An unguessable name for a file next to the folder, which is removed together with it.
 
-        For files that have to be written in the place where they will stay. There is no such file yet.
+        For files that must be written in their final folder. No file of that name exists yet.
         """
         assert self._mark is not None
         name = f"{PREFIX}{secrets.token_hex(16)}"
@@ -84,13 +85,13 @@ class PrivateFolder:
         return self.path.with_name(name)
 
     def close(self) -> None:
-        """Remove the folder and all in it; nothing happens the second time."""
+        """Remove the folder and its contents. Calling it again does nothing."""
         mark, self._mark = self._mark, None
         remove(self.path, mark)
 
 
 def temporary_place() -> str:
-    """Where temporary files go, for a sentence."""
+    """The folder for temporary files, for error messages."""
     try:
         return tempfile.gettempdir()
     except OSError:  # no folder that would do was found
@@ -98,17 +99,17 @@ def temporary_place() -> str:
 
 
 def remove(folder: Path, mark: BinaryIO | None = None) -> None:
-    """Remove a private folder, its mark last, so that a later sweep finds what could not be removed.
+    """Remove a private folder, its mark last, so that a later sweep finds whatever could not be removed.
 
     Parameters
     ----------
     folder : Path
     mark : BinaryIO, optional
-        The open mark, which is closed; what it names beside the folder goes as well.
+        The open mark, which is closed; the files next to the folder that it lists are removed as well.
     """
     left = [path for path in _siblings(folder, mark) if not _remove(path)]
     if mark is not None:
-        mark.close()  # before a folder is opened: there may be no more files than this that may be open
+        mark.close()  # before listing the folder: the limit of open files may be reached
     with suppress(OSError):
         left += [path for path in folder.iterdir() if path.name != _MARK and not _remove(path)]
     if not left and _remove(folder / _MARK):
@@ -117,7 +118,7 @@ def remove(folder: Path, mark: BinaryIO | None = None) -> None:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Remove private folders in ``parent`` whose processes ended without doing so; what cannot be removed stays."""
+    """Remove the private folders in ``parent`` that ended processes left behind; what cannot be removed stays."""
     with suppress(OSError), os.scandir(parent) as entries:
         found = [Path(entry.path) for entry in entries if entry.name.startswith(PREFIX)]
         for folder in found:
@@ -126,14 +127,14 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def _remove_if_abandoned(folder: Path) -> None:
-    found = folder.lstat()  # not what a symbolic link leads to
+    found = folder.lstat()  # does not follow symbolic links
     if not (_is_ours(found, stat.S_ISDIR) and folder.name == _proven(folder)):
         return
     is_old = clock.time() - found.st_mtime > _YOUNG
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
         opened = os.open(folder / _MARK, flags)
-    except FileNotFoundError:  # killed as it made the folder; what has anything in it stays
+    except FileNotFoundError:  # its process was killed while making it; rmdir keeps a folder that is not empty
         if is_old:
             folder.rmdir()
         return
@@ -147,13 +148,13 @@ def _remove_if_abandoned(folder: Path) -> None:
 
 
 def _proof(start: str, parent: Path) -> str:
-    """What the name of a private folder that begins so ends with, for this user in this place."""
+    """The second half of a private folder's name, which depends on the first, the user and the parent folder."""
     user = os.geteuid() if hasattr(os, "geteuid") else 0
     return hashlib.sha256(f"{start} {user} {parent.stat().st_ino}".encode()).hexdigest()[:16]
 
 
 def _proven(folder: Path) -> str:
-    """The only name that begins as that of ``folder`` does and that this user's private folders have there."""
+    """The only valid name of this user's private folder that begins like the name of ``folder``."""
     start = folder.name[: len(PREFIX) + 16]
     return f"{start}{_proof(start, folder.parent)}"
 
@@ -165,11 +166,11 @@ def _is_ours(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
 def _write_whole(mark: BinaryIO, text: str) -> None:
     data = text.encode()
     while data:
-        data = data[mark.write(data) :]  # what finds no room the first time is refused the second time
+        data = data[mark.write(data) :]  # a short write on a full disk is followed by an error
 
 
 def _siblings(folder: Path, mark: BinaryIO | None) -> list[Path]:
-    """The files beside a folder that belong to it, as its mark says, and what Blender calls them as it writes."""
+    """The files next to a folder that its mark lists, and the names that Blender gives them while it writes."""
     if mark is None:
         return []
     mark.seek(0)
@@ -178,7 +179,7 @@ def _siblings(folder: Path, mark: BinaryIO | None) -> list[Path]:
 
 
 def _remove(path: Path) -> bool:
-    """Remove a file, or a folder with all in it; whether it is gone."""
+    """Remove a file, or a folder with its contents; return whether it is gone."""
     with suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
@@ -188,12 +189,12 @@ def _remove(path: Path) -> bool:
 
 
 def _lock(file: BinaryIO) -> bool:
-    """Lock a file until it is closed; False where another one holds its lock, or the file system has no locks."""
+    """Lock a file until it is closed; return False if it is locked already, or if the file system has no locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            file.seek(_LONGEST_MARK)  # behind the end: a byte that is locked could not be read by others
+            file.seek(_LONGEST_MARK)  # beyond the end: others cannot read a locked byte
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
             file.seek(0)
         else:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One file in the place of another: when that may be done, what of the old one is kept, and how it is put back."""
+"""Replacing one file by another: whether it is allowed, which attributes are kept, and how it is undone."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ _LONGEST_WAIT = 2.0  # seconds that another process may take to put several file
 
 
 def require_replaceable(path: Path, target: Path) -> None:
-    """Refuse what is no file or is protected; whoever may write in a folder could replace it all the same.
+    """Refuse to replace what is not an ordinary file or is write-protected.
+
+    The system itself would allow more: whoever may write in a folder may replace protected files there.
 
     Parameters
     ----------
     path : Path
-        What the user calls the file.
+        The file as the user named it, for error messages.
     target : Path
-        Where it is, links followed; there need not be anything yet.
+        The same with links resolved; it need not exist.
 
     Raises
     ------
     InputError
-        If there is something else than a file.
+        If the target exists and is not an ordinary file.
     OSError
-        If the file may not be written to, or not be replaced.
+        If the file is write-protected or must not be replaced.
     """
     if not os.path.lexists(target):
         return
@@ -44,14 +46,14 @@ def require_replaceable(path: Path, target: Path) -> None:
         raise InputError(NO_FILE.format(path))
     if not os.access(target, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    # Where everybody may write, such as in /tmp, only the owner may replace a file.
+    # In shared folders such as /tmp, only the owner may replace a file.
     is_shared = folder.st_mode & stat.S_ISVTX
     if is_shared and hasattr(os, "geteuid") and os.geteuid() not in (0, found.st_uid, folder.st_uid):
         raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
 
 
 def inherit(new: Path, target: Path) -> None:
-    """Give a new file the mode, the owner and the access lists of the one it will replace, where this user may."""
+    """Give a new file the mode, owner and access lists of the file that it will replace, as far as allowed."""
     if not target.exists():
         return
     found = target.stat()
@@ -61,18 +63,18 @@ def inherit(new: Path, target: Path) -> None:
             with suppress(OSError):
                 os.chown(new, owner, group)
         if new.stat().st_gid != found.st_gid:
-            mode &= ~0o070 | (mode & 0o007) << 3  # another group gets no more than everybody
+            mode &= ~0o070 | (mode & 0o007) << 3  # a different group gets no more rights than everybody
     with suppress(OSError):  # not every file system has modes
         new.chmod(mode)
     if sys.platform == "linux":
         with suppress(OSError):
             for name in os.listxattr(target):
-                with suppress(OSError):  # some belong to the system
+                with suppress(OSError):  # only the system may set some of them
                     os.setxattr(new, name, os.getxattr(target, name))
 
 
 def set_aside(target: Path, folder: Path) -> Path | None:
-    """Another name, in ``folder``, for the file that is there now, if there is one."""
+    """Keep the present file, if there is one, under another name in ``folder``; return that name."""
     if not target.exists():
         return None
     kept = folder / "earlier"
@@ -84,7 +86,7 @@ def set_aside(target: Path, folder: Path) -> Path | None:
 
 
 def put_back(target: Path, kept: Path | None, new: os.stat_result) -> None:
-    """Undo a replacement, which need not have been done: what was set aside is there again, or nothing."""
+    """Undo a replacement, whether or not it took place: restore the kept file, or remove the new one."""
     if kept is not None:
         kept.replace(target)
     elif target.exists() and os.path.samestat(target.stat(), new):
@@ -93,14 +95,14 @@ def put_back(target: Path, kept: Path | None, new: os.stat_result) -> None:
 
 @contextmanager
 def alone_in(folders: Iterable[Path]) -> Iterator[None]:
-    """Wait until no other process puts files in their places in these folders, where the system can tell."""
+    """Wait, for a short time and where locks exist, until no other process replaces files in these folders."""
     with ExitStack() as stack:
         if sys.platform != "win32":
             import fcntl
 
             deadline = clock.monotonic() + _LONGEST_WAIT
             for folder in sorted(folders):
-                with suppress(OSError):  # not every folder may be opened, nor every file system has locks
+                with suppress(OSError):  # some folders cannot be opened, some file systems have no locks
                     opened = os.open(folder, os.O_RDONLY)
                     stack.callback(os.close, opened)
                     while clock.monotonic() < deadline:

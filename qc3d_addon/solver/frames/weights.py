@@ -161,7 +161,7 @@ def _bends(times: Floats, frames: Floats, fixed: Sequence[int]) -> Floats:
         flat = frames[first : last + 1].reshape(last + 1 - first, -1)
         if len(flat) > 4:
             for _ in range(4):
-                flat = np.gradient(flat, axis=0)
+                flat = np.asarray(np.gradient(flat, axis=0))
             density[first : last + 1] += np.abs(flat).max(axis=1, initial=0.0) ** 0.25
     density += 1e-3 * (density.mean() or 1.0)
     return np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(times))])

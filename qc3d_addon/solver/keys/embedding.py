@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both keys of a pair brought into the unit cube, and frames brought back."""
+"""The embedding of both keys of a pair in the unit cube, and the way back for frames."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from ..triangles.topology import face_adjacency, welded
 from .keypair import KeyPair
 from .own_axes import own_axes
 
-STILL_TOLERANCE = 1e-6
+STILL_TOLERANCE = 1e-6  # of the diagonal: above rounding in single precision, below what an animator would pose
 # Of the size: what travels less is held the more strongly the less it travels, so that it makes no difference whether a
 # vertex is just still or just not.
 NEARLY_STILL = 1e-4
+# Distance of the keys from the cube's faces: the volume around them needs room to move, and in-betweens may reach a
+# little beyond both keys.
 MARGIN = 0.17
 # Where this part of the surface is still, it holds the whole.
 _MOST_HELD = 0.04
@@ -30,14 +32,14 @@ _MOST_HELD = 0.04
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """The screw motion x -> R x + b as the exponential of a twist (rotation vector, velocity).
+    """A rigid motion x -> R x + b, as the exponential of a twist: a screw motion.
 
     Parameters
     ----------
     turn : (3,)
-        Rotation vector, radians.
+        Rotation vector of the twist, radians.
     velocity : (3,)
-        Linear part of the twist; the pure translation where nothing turns.
+        Linear part of the twist; it equals the translation b where ``turn`` is zero.
     """
 
     turn: Floats
@@ -45,14 +47,14 @@ class RigidMotion:
 
     @classmethod
     def identity(cls) -> RigidMotion:
-        """The motion that leaves everything in place."""
+        """The identity."""
         return cls(np.zeros(3), np.zeros(3))
 
     @classmethod
     def between(cls, source: Floats, target: Floats, weights: Floats) -> RigidMotion:
-        """Best rigid motion of the points ``source`` (n, 3) onto ``target`` in the weighted least-squares sense.
+        """Best rigid motion of points ``source`` (n, 3) onto ``target`` (n, 3) by weighted least squares (Kabsch 1976).
 
-        Weights (n,) are positive. Kabsch (1976). Points in one line turn no further than their line does.
+        The weights (n,) are positive. Collinear points take the smallest rotation that fits.
         """
         weights = weights / weights.sum()
         source_centre, target_centre = weights @ source, weights @ target
@@ -61,18 +63,18 @@ class RigidMotion:
 
     @classmethod
     def of_surface(cls, source: Floats, target: Floats, faces: Ints) -> RigidMotion:
-        """The mean motion of a surface from the shape ``source`` (n, 3) to ``target``.
+        """Mean rigid motion of a surface from the shape ``source`` (n, 3) to the shape ``target`` (n, 3).
 
-        It turns by the mean of the triangles' unwrapped rotations, weighted by area, and carries the centre of the
-        surface along. The best fit of the positions, which is all there is without triangles, is another thing where
-        wings flap or ends twist: there it can be half a turn away from every one of them.
+        The rotation is the area-weighted mean of the triangles' unwrapped rotations; the translation carries the
+        centroid along. Without usable triangles, it is the least-squares fit of the positions. That fit would be wrong
+        where wings flap or ends twist: there it can be half a turn away from the rotation of every triangle.
         """
         weights = vertex_areas(source, faces)
         vertices, group = welded(source, target)
         deformation = TriangleDeformation.between(source[vertices], target[vertices], group[faces])
         if not len(deformation.faces):
             return cls.between(source, target, weights)
-        # The same for both directions, and however much a key is scaled.
+        # Symmetric in both keys, and independent of their scale.
         sizes = np.sqrt(np.prod([areas(key[vertices], deformation.faces) for key in (source, target)], axis=0))
         turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes)
         return cls._of_turn(turn, *(np.average(key, axis=0, weights=weights) for key in (source, target)))
@@ -84,7 +86,7 @@ class RigidMotion:
 
     @property
     def rotation(self) -> Floats:
-        """(3, 3) the rotation of the whole motion."""
+        """(3, 3) rotation matrix of the whole motion."""
         return np.asarray(rotation_matrices(self.turn[None])[0])
 
     def part(self, share: float) -> RigidMotion:
@@ -92,19 +94,19 @@ class RigidMotion:
         return RigidMotion(share * self.turn, share * self.velocity)
 
     def apply(self, points: Floats, time: float = 1.0) -> Floats:
-        """Move points (n, 3) along the screw up to ``time`` (0 = not at all, 1 = all the way)."""
+        """Points (n, 3) moved along the screw up to ``time``: 0 is the start, 1 the whole motion."""
         turn = time * self.turn
         rotation = rotation_matrices(turn[None])[0]
         return np.asarray(points @ rotation.T + translation_factors(turn[None])[0] @ (time * self.velocity))
 
     def undo(self, points: Floats) -> Floats:
-        """Move points (n, 3) back along the whole screw."""
+        """Points (n, 3) moved by the inverse of the whole motion."""
         return self.apply(points, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """One similarity of both keys into the cube, and the rigid motion that was taken out of the second key.
+    """How a pair lies in the unit cube: one similarity for both keys, and the rigid motion removed from the second.
 
     The cube stands along axes that the keys define themselves: keys that are moved, turned and scaled alike come to lie
     in it in the same way.
@@ -115,12 +117,12 @@ class Embedding:
     axes : (3, 3)
         Orthonormal rows: the axes of the cube in the keys' coordinates.
     travel : (n,)
-        Distances between the two positions of each vertex over the diagonal of the first key's box along the axes.
+        Distances between the two positions of each vertex, relative to the diagonal of the first key along the axes.
     motion : RigidMotion
-        Carries the first key along with the second as their surface does on average, in the keys' own units, seen
-        along the axes. The less of it, the more of the surface is still.
+        Mean rigid motion of the surface from the first key to the second, in the keys' own units, in coordinates along
+        the axes; only a part of it, or nothing, where some of the surface is still.
     centre : (3,)
-        Point that goes to the middle of the cube, seen along the axes.
+        The point that goes to the center of the cube, in coordinates along the axes.
     scale : float
         Cube units per unit of the keys.
     """
@@ -134,7 +136,7 @@ class Embedding:
 
     @classmethod
     def of(cls, pair: KeyPair) -> Embedding:
-        """Embed a pair: both keys, the second one without its rigid motion, fill [0.17, 0.83]^3."""
+        """Embed a pair so that both keys, the second without its rigid motion, just fit into [0.17, 0.83]³."""
         axes = own_axes(pair.key0, pair.key1, vertex_areas(pair.key0, pair.faces))
         key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
         diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
@@ -149,16 +151,16 @@ class Embedding:
 
     @cached_property
     def still(self) -> Bools:
-        """(n,): vertices that both keys leave in place."""
+        """(n,) still vertices: those that both keys leave in place."""
         return np.asarray(self.travel <= STILL_TOLERANCE)
 
     def to_cube(self, points: Floats, time: float = 0.0) -> Floats:
-        """Points (k, 3) from the keys' units to cube units, moved back along the rigid motion from ``time``."""
+        """Points (k, 3) in cube units, given in the keys' units at ``time`` (0..1) of the rigid motion."""
         moved = self.motion.apply(points @ self.axes.T, -time)
         return np.asarray((moved - self.centre) * self.scale + 0.5)
 
     def from_cube(self, points: Floats, time: float) -> Floats:
-        """Points (k, 3) from cube units back to the keys' units, moved along the rigid motion up to ``time``."""
+        """Points (k, 3) in the keys' units, given in cube units, moved along the rigid motion up to ``time`` (0..1)."""
         return np.asarray(self.motion.apply((points - 0.5) / self.scale + self.centre, time) @ self.axes)
 
     def straight(self, time: float) -> Floats:
@@ -166,23 +168,23 @@ class Embedding:
         return self.to_cube(self.pair.key0 + time * (self.pair.key1 - self.pair.key0), time)
 
     def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
-        """Displacements (k, 3) at ``time`` from the keys' units to cube units: ``from_cube`` undone for differences."""
+        """Displacements (k, 3) at ``time`` in cube units, given in the keys' units: ``from_cube`` inverted."""
         rotation = rotation_matrices(time * self.motion.turn[None])[0]
         return np.asarray(self.scale * (vectors @ self.axes.T @ rotation))
 
     @cached_property
     def key0(self) -> Floats:
-        """(n, 3): the first key in cube units."""
+        """(n, 3) the first key in cube units."""
         return self.to_cube(self.pair.key0)
 
     @cached_property
     def key1(self) -> Floats:
-        """(n, 3): the second key in cube units, without its rigid motion."""
+        """(n, 3) the second key in cube units, without its rigid motion."""
         return self.to_cube(self.pair.key1, 1.0)
 
     @cached_property
     def weights(self) -> Floats:
-        """(n,): vertex areas of the first key, with sum 1; loose vertices count as a small area."""
+        """(n,) vertex areas of the first key, normalized to the sum 1; a loose vertex has a small positive weight."""
         areas = vertex_areas(self.key0, self.pair.faces)
         return np.asarray(areas / areas.sum())
 

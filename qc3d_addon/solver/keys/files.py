@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys read from .npz files."""
+"""Reading keys from .npz files."""
 
 from __future__ import annotations
 
@@ -18,23 +18,28 @@ from .keypair import Ends, KeyPair, consecutive_pairs
 def read_pairs(
     path: Path, names: Sequence[str], *, frames: int = 0, quality: Quality = "normal", needs_fits: bool = True
 ) -> dict[Ends, KeyPair]:
-    """Read shapes of one mesh: the pair of every two of ``names`` that follow each other, by their names.
+    """Read the pairs of consecutive shapes of one mesh, by the names of their two ends.
 
     Parameters
     ----------
     path : Path
         An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
-        of the names. Other arrays are not looked at; pickled objects are refused.
+        of the names. Other arrays are ignored; pickled objects are refused.
     names : sequence of str
-        Names of two shapes or more, no name twice in a row.
-    frames, quality, needs_fits
-        What is to be made of them: it must fit into the machine's memory, and that is known before they are read.
+        Names of two or more shapes, no name twice in a row.
+    frames : int
+        Number of frames that will be computed from the pairs.
+    quality : Quality
+        Resolution of the volume that will be used.
+    needs_fits : bool
+        Whether the pairs will be fitted. These three decide how much memory is needed, which is checked before the
+        arrays are read.
 
     Raises
     ------
     InputError
-        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if memory would
-        not be enough.
+        If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if the machine
+        does not have enough memory.
     """
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
         known = _shape_names(archive, path)
@@ -55,7 +60,7 @@ def read_pairs(
 
 
 def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") -> KeyPair:
-    """Two shapes of one mesh by their names; see ``read_pairs``."""
+    """Read the pair of two shapes by their names; see ``read_pairs``."""
     return read_pairs(path, (first, second), quality=quality)[first, second]
 
 

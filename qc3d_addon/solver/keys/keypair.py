@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The input of the solver: two keys of one mesh, checked once on the way in."""
+"""The input of the solver: two keys of one mesh, validated once."""
 
 from __future__ import annotations
 
@@ -20,30 +20,37 @@ from ..triangles.topology import sides, welded
 # The names of the first and the second key of a pair.
 Ends = tuple[str, str]
 
-# Cubes of what lies between, and squares of its areas, still are numbers.
+# Between these sizes, cubes of lengths and squares of areas stay within the range of double precision.
 _SMALLEST, LARGEST = 1e-75, 1e75
-_MOST_GROWTH = 1e10
-# Copies of a vertex differ by this many steps of single precision at the largest coordinate, where several roundings
-# add up; but never by more than a part of the size, however far from the origin the mesh is.
+_MOST_GROWTH = 1e10  # of the sizes of two keys: beyond it their common scale leaves the smaller one too few digits
+# Coincident vertices may differ by this many steps of single precision at the largest coordinate, since several
+# roundings add up; but never by more than a fraction of the key's size, however far from the origin the mesh is.
 _SINGLE_STEP = float(np.finfo(np.float32).eps)
 _ROUNDING_STEPS = 8.0
 _MOST_ROUNDING = 3e-3
-# Where single precision tells positions only this part of a key's size apart, its shape suffers.
+# If a step of single precision exceeds this fraction of a key's size, its shape is visibly damaged.
 _COARSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class KeyPair:
-    """Two shapes of one mesh. Build it with ``KeyPair.checked``, which validates.
+    """Two keys of one mesh. Build it with ``KeyPair.checked``, which validates the arrays.
 
     Parameters
     ----------
     key0, key1 : (n, 3) float64
         Vertex positions of the first and the second key, in the object's own units.
     faces : (m, 3) int64
-        Triangles (polygons are triangulated before they come here); may be empty.
+        Triangles; may be empty. Polygons are triangulated by the caller.
     edges : (e, 2) int64
-        Edges to keep together that belong to no face; may be empty.
+        Edges that belong to no face and keep their length; may be empty.
+
+    Examples
+    --------
+    >>> key0 = [[0, 0, 0], [3, 0, 0], [0, 4, 0]]
+    >>> pair = KeyPair.checked(key0, [[0, 0, 0], [3, 0, 0], [0, 0, 4]], [[0, 1, 2]])
+    >>> pair.diagonal
+    5.0
     """
 
     key0: Floats
@@ -53,7 +60,7 @@ class KeyPair:
 
     @classmethod
     def checked(cls, key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None) -> KeyPair:
-        """Validate the arrays and make a pair of them.
+        """Validate arrays of any origin and make a pair of them.
 
         Raises
         ------
@@ -73,39 +80,39 @@ class KeyPair:
 
     @cached_property
     def diagonal(self) -> float:
-        """Length of the first key's bounding-box diagonal, the unit of relative errors.
+        """Length of the first key's bounding-box diagonal, the unit of all relative errors.
 
-        Of the second key where all vertices of the first are in one place; 1 where those of both are.
+        If all vertices of the first key coincide, that of the second key; if those of both do, 1.
         """
         lengths = (hypot(*np.ptp(key, axis=0)) for key in (self.key0, self.key1))
         return next((length for length in lengths if length > 0.0), 1.0)
 
     @cached_property
     def welding(self) -> tuple[Ints, Ints]:
-        """One vertex of each group that coincides in both keys (k,), and the group of every vertex (n,).
+        """Representatives (k,) of the groups of vertices that coincide in both keys, and the group of each vertex (n,).
 
-        Copies of a vertex may differ by a few steps of single precision, in which meshes are stored: at seams whose
-        sides were computed apart, or between objects that were joined.
+        Coincident vertices may differ by a few steps of single precision, in which meshes are stored: for example at
+        seams whose sides were computed separately, or between objects that were joined.
         """
         reach = (_rounding(self.key0), _rounding(self.key1))
         return welded(self.key0, self.key1, reach, np.concatenate([sides(self.faces), self.edges]))
 
     @cached_property
     def welded_faces(self) -> Ints:
-        """(m, 3) the triangles with one vertex of each group at their corners, so that they meet at seams."""
+        """(m, 3) the triangles with each vertex replaced by its group's representative, so that they join at seams."""
         vertices, group = self.welding
         return np.asarray(vertices[group[self.faces]])
 
     @cached_property
     def nearly_coincident(self) -> int:
-        """How many vertices are taken as one with another although rounding has moved them apart in a key."""
+        """Number of vertices that are grouped with another although rounding separates them in a key."""
         vertices, group = self.welding
         apart = [(key != key[vertices][group]).any(axis=1) for key in (self.key0, self.key1)]
         return int(np.count_nonzero(apart[0] | apart[1]))
 
     @cached_property
     def far_away(self) -> str | None:
-        """A sentence where a key lies so far from its origin that single precision has lost much of its shape."""
+        """A sentence for the user if a key lies so far from its origin that single precision damaged its shape."""
         error = _lost_far_away(self.key0, self.key1)
         return None if error is None else str(error)
 
@@ -113,21 +120,23 @@ class KeyPair:
 def consecutive_pairs(
     shapes: Mapping[str, ArrayLike], faces: ArrayLike, edges: ArrayLike | None, through: Sequence[str]
 ) -> dict[Ends, KeyPair]:
-    """The pair of every two keys that follow each other, by their names; one that comes again is made once.
+    """The pairs of consecutive keys of a chain, by the names of their ends; a repeated pair is made once.
 
     Parameters
     ----------
-    shapes : dict of (n, 3)
+    shapes : mapping of str to (n, 3)
         Shapes of one mesh by name.
-    faces, edges : (m, 3), (e, 2)
-        See ``KeyPair``.
+    faces : (m, 3) int64
+        Triangles.
+    edges : (e, 2) int64, optional
+        Edges that belong to no face.
     through : sequence of str
         Names of the keys from the first to the last.
 
     Raises
     ------
     InputError
-        If two keys that follow each other are one and the same, or cannot be used.
+        If two consecutive keys are the same one, or if keys cannot be used.
     """
     pairs: dict[Ends, KeyPair] = {}
     for first, second in pairwise(through):
@@ -142,7 +151,7 @@ def consecutive_pairs(
 
 
 def _lost_far_away(first: Floats, second: Floats) -> InputError | None:
-    """The error to raise where the cause is a far offset in single precision."""
+    """The error that says that a key is too far from its origin for single precision; None if none is."""
     size = max(float(np.ptp(key, axis=0).max()) for key in (first, second))
     for key, name in ((first, "first"), (second, "second")):
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
@@ -177,12 +186,12 @@ def _positions(key: ArrayLike, name: str) -> Floats:
 
 
 def require_sizes(pair: KeyPair) -> None:
-    """Check that what is computed on the way from one key to the other fits into floating point.
+    """Check that the computation from one key to the other stays within the range of floating point.
 
     Raises
     ------
     InputError
-        If a key is too large, too small, or far larger or smaller than the other.
+        If a key is too large or too small, or the keys' sizes differ by more than a factor of 1e10.
     """
     sizes = []
     for key, name in ((pair.key0, "first"), (pair.key1, "second")):
@@ -206,7 +215,7 @@ def require_sizes(pair: KeyPair) -> None:
 
 
 def _rounding(key: Floats) -> float:
-    """How far apart copies of a vertex may be along an axis."""
+    """How far apart coincident vertices of a key may be along an axis."""
     steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
     return min(steps, _MOST_ROUNDING * float(np.ptp(key, axis=0).max(initial=0.0)))
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a second key is the first one mirrored or turned inside out, found out before any slow work."""
+"""Detects, before any slow work, a second key that is mirrored or turned inside out."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from ..triangles.geometry import areas
 from ..triangles.topology import sides, unique_edges, vertex_components
 from .keypair import KeyPair
 
-# Of the surface: beyond this the keys as a whole are mirrored, below it only parts of them.
+# Share of the surface above which the key as a whole counts as mirrored, and not only some of its parts.
 _MOST_SHARE = 0.5
-# Volumes below this part of the size cubed are none; parts that are as small as the second are named all the same.
+# Volumes below these fractions of the cubed size may be nothing but rounding: the first decides about the share of the
+# surface, the second about the parts that are counted in the report.
 _LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
-# What is turned inside out holds, for its surface, at least this part of the volume that it held before: what crosses
-# itself all over or is flattened holds next to none, on whichever side.
+# A part that is turned inside out still encloses, relative to its area, at least this fraction of its former volume. A
+# part that crosses itself all over or is flattened encloses almost none, and the sign of its volume means nothing.
 _AS_FULL = 0.3
 
 
 @dataclass(frozen=True)
 class Reversal:
-    """How much of a mesh no motion of a volume carries from the first key to the second.
+    """How much of a mesh cannot be carried from the first key to the second by a motion of the volume.
 
     Parameters
     ----------
     mirrored : float
-        Of the first key's surface, 0..1: closed components that are mirror images or turned inside out.
+        Share of the first key's surface, 0..1, in closed components that become mirror images or turn inside out.
     tangled : float
-        The same for closed components that cross themselves so far, or are so flat, that their signed volume has the
-        other sign.
+        Share of the surface, 0..1, in closed components whose signed volume changes its sign only because they cross
+        themselves so much or become so flat.
     parts : int
-        How many components are mirrored.
+        Number of mirrored components.
     """
 
     mirrored: float
@@ -46,12 +47,12 @@ class Reversal:
 
 
 def require_reachable(pair: KeyPair) -> Reversal:
-    """Check that a motion of the volume can lead from the first key to the second; returns what it does not reach.
+    """Check that a motion of the volume can lead from the first key to the second; return what it cannot reach.
 
     Raises
     ------
     InputError
-        If more than half of the surface is mirrored, turned inside out or tangled: no map that keeps orientation does
+        If more than half of the surface is mirrored, turned inside out or tangled: no orientation-preserving map does
         that.
     """
     found = reversal(pair)
@@ -71,16 +72,15 @@ def require_reachable(pair: KeyPair) -> Reversal:
 
 
 def mirrored_share(pair: KeyPair) -> float:
-    """The part of the first key's surface, 0..1, that is mirrored, turned inside out or tangled in the second."""
+    """Share of the first key's surface, 0..1, that is mirrored, turned inside out or tangled in the second key."""
     found = reversal(pair)
     return found.mirrored + found.tangled
 
 
 def reversal(pair: KeyPair) -> Reversal:
-    """What is mirrored, turned inside out or tangled between the keys.
+    """Find what is mirrored, turned inside out or tangled, by the sign of each closed component's volume.
 
-    Told by the sign of the volume that a closed component encloses. What is open has no inside that could be turned
-    out: a leaf may bend to its mirror image.
+    Open components are never counted: they have no inside, and a leaf may well bend into its mirror image.
     """
     vertices, group = pair.welding
     keys = [_in_unit_size(key[vertices]) for key in (pair.key0, pair.key1)]

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Filling the unit cube with tetrahedra, finest at the surface: two engines behind one function."""
+"""Fills the unit cube with tetrahedra, finest near the surface: two engines behind one function."""

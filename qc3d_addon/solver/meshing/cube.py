@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fill the unit cube around a surface with tetrahedra: two engines behind one function."""
+"""Fills the unit cube with tetrahedra around a surface: two engines behind one function."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from .poisson_disk import RESOLUTIONS
 from .tetwild import MARGIN, tetwild_mesh
 from .tetwild_loading import unavailable_reason
 
-SMALLEST_VOLUME = 1e-14  # of the cube's: a tetrahedron of this size and edges of 0.01 has angles near rounding
+# As a fraction of the cube's volume. A tetrahedron with edges of 0.01 and this volume is flat up to rounding.
+SMALLEST_VOLUME = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class FilledCube:
-    """A tetrahedral mesh of the unit cube and how it came about.
+    """A tetrahedral mesh of the unit cube, and how it was made.
 
     Parameters
     ----------
     mesh : TetMesh
-        Conforming, positively oriented, total volume 1; coordinates on the cube's faces are exactly 0 or 1.
+        Conforming, positively oriented, with total volume 1; coordinates on the cube's faces are exactly 0 or 1.
     engine : str
         The engine that made it: ``tetwild`` or ``delaunay``.
     notes : tuple of str
@@ -42,22 +43,23 @@ class FilledCube:
 def fill_cube(points: Floats, faces: Ints, options: FitOptions) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
-    The surface's vertices do not become vertices of the mesh: the resolution follows ``options.quality``, not the
-    vertex count. Find the vertices in the mesh with :mod:`.location`.
+    The surface's vertices do not become vertices of the mesh: its resolution depends on ``options.quality``, not on
+    the number of vertices. Find the surface in the mesh with :mod:`~qc3d_addon.solver.tets.point_location`.
 
     Parameters
     ----------
     points : (n, 3) float64
         Vertices inside [0.14, 0.86]³.
     faces : (m, 3) int64
-        Triangles: open, non-manifold, crossing, degenerate or none at all.
+        Triangles; they may be open, non-manifold, crossing or degenerate, and there may be none.
     options : FitOptions
+        Its quality, engine, seed and time limit.
 
     Raises
     ------
     MeshingError
-        If the input is unusable, or the chosen engine cannot run or fails; with ``auto`` the second engine steps in
-        and a note says so.
+        If the input is unusable, or if the chosen engine is unavailable or fails. With the engine ``auto``, delaunay
+        takes over from tetwild instead, and a note says so.
     """
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
@@ -80,7 +82,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions) -> FilledCube:
 
 
 def require_filled_cube(mesh: TetMesh) -> None:
-    """Check that a mesh is a conforming partition of the unit cube into positive tetrahedra.
+    """Check that a mesh is a conforming partition of the unit cube into positively oriented tetrahedra.
 
     Raises
     ------
@@ -106,7 +108,7 @@ def require_filled_cube(mesh: TetMesh) -> None:
 def _require_usable(points: Floats, faces: Ints) -> None:
     if not len(points):
         raise MeshingError("There is no vertex to fill the cube around.")
-    # Not "outside the range": the comparison must also catch what is not a number.
+    # Tested as "inside", since a comparison with NaN is false.
     bad = np.flatnonzero(~((points >= MARGIN) & (points <= 1.0 - MARGIN)).all(axis=1))
     if bad.size:
         raise MeshingError(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The meshing engine without compiled dependencies: graded samples of the cube and their Delaunay tetrahedra."""
+"""The meshing engine ``delaunay``, which needs only scipy: Delaunay tetrahedra of graded samples of the cube."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from .slivers import sliver_free
 
 
 def delaunay_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int) -> TetMesh:
-    """Fill the cube; repeatable: the same input and seed give the same mesh.
+    """Fill the cube. Deterministic: the same input and seed give the same mesh.
 
     Parameters
     ----------
     points : (n, 3) float64
         Vertices strictly inside the cube.
     faces : (m, 3) int64
-        Triangles, in any state; may be empty.
+        Triangles in any state; may be empty.
     resolution : Resolution
+        Target distances between samples.
     seed : int
+        Seed of the random samples.
     """
     rng = np.random.default_rng(seed)
     surface = sample_surface(points, faces, resolution.spacing, rng)

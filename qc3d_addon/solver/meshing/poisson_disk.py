@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Graded Poisson-disk samples of the cube: dense near the surface, thinned with the distance from it.
+"""Graded Poisson-disk samples of the cube: dense near the surface, sparser with the distance from it.
 
-Follows the sampling of Chen & Lui (arXiv 2308.05333, section 4): samples too close to one another, the surface's
-included, are dropped by a threshold that grows with the distance from the surface.
+Serves the purpose of the sampling in Chen & Lui (arXiv 2308.05333, section 6.1), but differs from it: there, samples of
+one uniform Poisson disk are discarded at random, with a probability that depends on their distance from the surface;
+here, the radius of the disk itself grows linearly with that distance, and nothing is discarded at random.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from ..triangles.topology import without_piles
 
 SizeField = Callable[[Floats], Floats]
 
-_OVERSAMPLING = 4.0  # candidates per disk: enough that few holes are left between the disks
-_NEIGHBOURS = 16
-_MOST_CANDIDATES = 500_000  # on surfaces folded so densely that more would lie in the disks of others
+_OVERSAMPLING = 4.0  # candidates per disk: enough to leave few gaps between the disks
+_NEIGHBOURS = 16  # at this oversampling, few candidates have more neighbors inside their disk
+_MOST_CANDIDATES = 500_000  # of a surface: where it is folded more densely, further ones would be rejected anyway
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """Distance between samples: ``spacing`` at the surface, growing with the distance from it up to ``largest``.
+    """Distance between samples: ``spacing`` at the surface, growing linearly away from it, up to ``largest``.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ class Resolution:
     largest: float
 
     def around(self, surface: Floats) -> SizeField:
-        """The distance between samples as a function of position, for a surface given by points (k, 3)."""
+        """Distance between samples as a function of position, around a surface given by samples (k, 3)."""
         tree = cKDTree(surface)
 
         def size(positions: Floats) -> Floats:
@@ -54,6 +55,8 @@ class Resolution:
         return size
 
 
+# With "normal" the in-betweens of mode natural are as good as with finer volumes (docs/science/speed.md). The finer
+# ones are for measures of the volume and for mode linear.
 RESOLUTIONS: dict[Quality, Resolution] = {
     "normal": Resolution(spacing=0.03, slope=0.3, largest=0.12),
     "fine": Resolution(spacing=0.02, slope=0.25, largest=0.1),
@@ -62,32 +65,34 @@ RESOLUTIONS: dict[Quality, Resolution] = {
 
 
 def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools:
-    """Choose a maximal subset of ``candidates`` that respects their disks; earlier candidates have precedence.
+    """Choose a maximal Poisson-disk subset of candidates; earlier candidates take precedence.
 
     Parameters
     ----------
     candidates : (n, 3) float64
+        Points to choose from.
     radii : (n,) float64
         A candidate is chosen only if no point chosen before it is nearer than its radius.
     kept : (k, 3) float64, optional
-        Points chosen already.
+        Points that are chosen already.
 
     Returns
     -------
     (n,) bool
+        Whether each candidate is chosen.
     """
     chosen = np.zeros(len(candidates), dtype=bool)
     open_ = np.arange(len(candidates))
     if kept is not None and len(kept):
         open_ = open_[cKDTree(kept).query(candidates)[0] >= radii]
     while open_.size:
-        # A candidate wins the round when no earlier neighbour is inside its disk; the first always wins.
+        # A candidate wins the round if no earlier neighbor is inside its disk; the first always wins.
         distance, neighbour = cKDTree(candidates[open_]).query(candidates[open_], k=min(_NEIGHBOURS, open_.size))
         distance, neighbour = np.reshape(distance, (open_.size, -1)), np.reshape(neighbour, (open_.size, -1))
         order = np.arange(open_.size)
         wins = ~((distance < radii[open_, None]) & (neighbour < order[:, None])).any(axis=1)
         if not wins.all():
-            # Where more candidates crowd in a disk than neighbours are looked at, winners may still be in conflict.
+            # Where a disk contains more candidates than the neighbors looked at, winners may still conflict.
             wins[wins] = thin(candidates[open_[wins]], radii[open_[wins]])
         chosen[open_[wins]] = True
         winners = candidates[open_[wins]]
@@ -97,7 +102,7 @@ def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools
 
 
 def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) -> Floats:
-    """Poisson-disk samples (k, 3) of the triangles and of the vertices, about ``spacing`` apart."""
+    """(k, 3) Poisson-disk samples of triangles (m, 3) and of vertices (n, 3), at least ``spacing`` apart."""
     corners = points[faces]
     sizes = areas(points, faces)
     total = float(sizes.sum())
@@ -115,14 +120,15 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
 
 
 def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
-    """Fill the cube around the surface's samples: its corners, edges, faces and inside, thinned by ``size``.
+    """Sample the corners, edges, faces and inside of the cube around given samples of the surface.
 
     Parameters
     ----------
     surface : (k, 3) float64
-        Samples of the surface, strictly inside the cube; they are kept.
+        Samples of the surface, strictly inside the cube; all are kept.
     size : callable
         Target distance between samples at positions (n, 3).
+    rng : Generator
 
     Returns
     -------
@@ -133,7 +139,7 @@ def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
     for dimension in (1, 2, 3):
         candidates = _candidates(dimension, size, rng)
         radii = size(candidates)
-        # What is not on the cube's faces keeps its distance from them, or flat tetrahedra would line them.
+        # Samples that are not on the cube's faces keep a distance from them, to avoid flat tetrahedra along the faces.
         gap = np.minimum(candidates, 1.0 - candidates)
         free = ((gap == 0.0) | (gap >= 0.6 * radii[:, None])).all(axis=1)
         candidates, radii = candidates[free], radii[free]
@@ -151,7 +157,7 @@ def _lattice(ticks: Floats, dimension: int) -> Floats:
 
 
 def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
-    """Random points on the cube's edges (1), faces (2) or inside (3), as dense as ``size`` asks, in random order."""
+    """Random points in random order on the cube's edges (1), faces (2) or inside (3), with the density of ``size``."""
     cells = 32
     lattice = _lattice(np.arange(cells) / cells, dimension)
     parts = []
@@ -170,7 +176,7 @@ def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
 
 
 def _pieces(dimension: int) -> list[tuple[list[int], Floats]]:
-    """The cube's edges, faces or inside: its free axes, and the coordinates of the fixed ones."""
+    """The cube's edges, faces or inside, each as its free axes and a point with the coordinates of the fixed ones."""
     pieces = []
     for corner in _corners():
         for free in ([0], [1], [2]) if dimension == 1 else ([0, 1], [0, 2], [1, 2]) if dimension == 2 else ([0, 1, 2],):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape of tetrahedra, and the removal of slivers from Delaunay meshes whose vertices are free to move."""
+"""Shape quality of tetrahedra, and removal of slivers from Delaunay meshes by moving their vertices."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from ..numerics.grouped_sums import means_by_label
 from ..tets.mesh import OPPOSITE_FACES, TetMesh, edge_matrices
 from .poisson_disk import SizeField
 
-WANTED_ANGLE = 12.0  # degrees
-_SMOOTHING_SWEEPS = 5
-_REPAIR_ROUNDS = 40
-_STEP = 0.3  # of the local distance between samples
-_WALL = 1e-3  # what is not on a face of the cube stays this far from it
+WANTED_ANGLE = 12.0  # degrees; smaller dihedral angles condition the fit badly, larger ones cannot be reached reliably
+_SMOOTHING_SWEEPS = 5  # each triangulates anew; further ones improve little
+_REPAIR_ROUNDS = 40  # a cap; a few usually suffice
+_STEP = 0.3  # of the local distance between samples: enough to open a sliver, too little to leave a gap
+_WALL = 1e-3  # smallest distance from a face of the cube for samples that are not on it
 
 
 def smallest_dihedral_angles(mesh: TetMesh) -> Floats:
-    """(M,) smallest of the six dihedral angles of each tetrahedron, in degrees; 70.5 for the regular one."""
+    """(M,) smallest of the six dihedral angles of each tetrahedron, in degrees; 70.5 if it is regular."""
     corners = mesh.points[mesh.tets[:, OPPOSITE_FACES]]
     normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
-    # A face without area keeps its zero normal; the flat tetrahedron shows in the angle between its other faces.
+    # A face without area keeps its zero normal: the other faces' angles show that the tetrahedron is flat.
     normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), np.finfo(np.float64).tiny)
-    # The angle between two faces is the supplement of that between their outward normals.
+    # The dihedral angle of two faces is the supplement of the angle between their outward normals.
     cosines = -np.einsum("mia,mja->mij", normals, normals)
     first, second = np.triu_indices(4, 1)
     angles: Floats = np.degrees(np.arccos(np.minimum(cosines[:, first, second].max(axis=1), 1.0)))
@@ -34,9 +34,9 @@ def smallest_dihedral_angles(mesh: TetMesh) -> Floats:
 
 
 def triangulate(samples: Floats) -> Ints:
-    """Delaunay tetrahedra (M, 4), positively oriented, of samples (N, 3) that include the cube's corners.
+    """(M, 4) Delaunay tetrahedra, positively oriented, of samples (N, 3) that include the cube's corners.
 
-    Tetrahedra whose corners share a face of the cube have no volume and are left out; they only ever line the hull.
+    Tetrahedra with all corners on one face of the cube have no volume; they occur only along the hull and are left out.
     """
     # In an order of their own: the one in which they are found depends on rounding, and what follows draws lots.
     tets: Ints = np.sort(np.asarray(Delaunay(samples).simplices, dtype=np.int64), axis=1)
@@ -50,20 +50,26 @@ def triangulate(samples: Floats) -> Ints:
 
 
 def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
-    """Delaunay mesh of moved samples, whose smallest dihedral angle exceeds 12 degrees wherever that can be reached.
+    """Move samples so that the dihedral angles of their Delaunay mesh exceed 12 degrees, as far as that is possible.
 
-    First a few sweeps carry every sample to the weighted centroid of its tetrahedra (Chen & Holst 2011, *Efficient
-    mesh optimization schemes based on optimal Delaunay triangulations*); then one corner of each sliver that is left
-    moves at random, and the mesh is made anew, until none is left (in the spirit of Tournois, Srinivasan & Alliez
-    2009, *Perturbing slivers in 3D Delaunay meshes*). Every mesh on the way is Delaunay, hence conforming. Samples on
-    the cube's faces slide in them, those on its edges along them; its corners stay.
+    First, smoothing sweeps move every sample to the weighted centroid of its tetrahedra (Chen & Holst 2011, *Efficient
+    mesh optimization schemes based on optimal Delaunay triangulations*). Then, until no sliver is left, one random
+    corner of each sliver moves at random and the samples are triangulated again (in the spirit of Tournois, Srinivasan
+    & Alliez 2009, *Perturbing slivers in 3D Delaunay meshes*). Every mesh along the way is Delaunay and therefore
+    conforming. Samples on the cube's faces and edges slide within them; the cube's corners stay.
 
     Parameters
     ----------
     samples : (N, 3) float64
-        Samples of the unit cube, its corners included.
+        Samples of the unit cube, including its corners.
     size : callable
-        The local distance between samples.
+        Local distance between samples at positions (n, 3).
+    rng : Generator
+
+    Returns
+    -------
+    TetMesh
+        The mesh with the largest smallest angle that was found.
     """
     free = (samples != 0.0) & (samples != 1.0)
     for _ in range(_SMOOTHING_SWEEPS):
@@ -89,7 +95,7 @@ def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
 
 
 def _centroids(mesh: TetMesh, size: SizeField) -> Floats:
-    """(N, 3): mean of the centroids around each vertex, weighted so that the grading is kept."""
+    """(N, 3) mean of the centroids of the tetrahedra around each vertex, weighted so that the grading is kept."""
     centroids = mesh.centroids
     weights = mesh.volumes / size(centroids) ** 3
     corners, count = mesh.tets.ravel(), len(mesh.points)
@@ -97,5 +103,5 @@ def _centroids(mesh: TetMesh, size: SizeField) -> Floats:
 
 
 def _held(before: Floats, after: Floats, free: Bools) -> Floats:
-    """Moved samples, except for the coordinates held by the cube's faces."""
+    """The moved samples, without changes to coordinates that are fixed by the cube's faces."""
     return np.where(free, np.clip(after, _WALL, 1.0 - _WALL), before)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The meshing engine fTetWild (Hu et al. 2020, *Fast tetrahedral meshing in the wild*), run in a child process."""
+"""The engine ``tetwild``: fTetWild (Hu et al. 2020, *Fast tetrahedral meshing in the wild*) in a child process."""
 
 from __future__ import annotations
 
@@ -25,24 +25,25 @@ _EDGE_FACTOR = 1.6  # fTetWild's ideal edges per distance between Poisson-disk s
 
 
 def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int, time_limit: float) -> TetMesh:
-    """Fill the cube. Not repeatable: fTetWild gives another mesh at every call.
+    """Fill the cube. Not deterministic: fTetWild makes a different mesh at every call.
 
     Parameters
     ----------
     points : (n, 3) float64
         Vertices inside [0.14, 0.86]³.
     faces : (m, 3) int64
-        Triangles, in any state.
+        Triangles in any state.
     resolution : Resolution
+        Target distances between vertices.
     seed : int
-        Of the samples that carry the size field.
+        Seed of the samples that carry the size field.
     time_limit : float
         Seconds after which the child process is killed.
 
     Raises
     ------
     MeshingError
-        If fTetWild is not available, has no triangle to work on, fails, crashes or exceeds the limit.
+        If fTetWild is unavailable, has no usable triangle, fails, crashes or exceeds the time limit.
     """
     vertices, triangles = cluster(points, faces, 0.75 * resolution.spacing)
     if not len(triangles):
@@ -52,8 +53,8 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
     surface = sample_surface(points, faces, coarse.spacing, rng)
     samples = sample_cube(surface, coarse.around(surface), rng)
     background = TetMesh(samples, triangulate(samples))
-    # fTetWild works in the bounding box of all its vertices, grown by the edge length on every side. With the two
-    # vertices that no triangle uses this box is the unit cube, exactly.
+    # fTetWild fills the bounding box of its vertices, grown by the edge length on every side. Two extra vertices that
+    # no triangle uses make this box exactly the unit cube.
     inner = np.array([[MARGIN] * 3, [1.0 - MARGIN] * 3])
     diagonal = float(np.linalg.norm(inner[1] - inner[0]))
     arrays = {
@@ -62,33 +63,37 @@ def tetwild_mesh(points: Floats, faces: Ints, resolution: Resolution, seed: int,
         "edge_length": np.array(MARGIN),
         "epsilon": np.array(0.7 * resolution.spacing / diagonal),
         "size_points": samples,
-        "size_tets": background.tets[background.volumes > 1e-10],  # fTetWild interpolates in them
+        "size_tets": background.tets[background.volumes > 1e-10],  # interpolation in flat ones would fail
         "size_values": _EDGE_FACTOR * resolution.around(surface)(samples),
     }
     positions, tets = run_child(arrays, time_limit)
     for exact in (0.0, 1.0):
         positions[np.abs(positions - exact) < 1e-9] = exact
-    # The two vertices come back without tetrahedra: equations on the mesh would be singular there.
+    # The two extra vertices come back without tetrahedra, and would make every linear system on the mesh singular.
     used, corners = np.unique(tets, return_inverse=True)
     return TetMesh(positions[used], corners.reshape(-1, 4).astype(np.int64))
 
 
 def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:
-    """Coarsen a triangle mesh: the vertices of one cell of a regular grid become one, triangles that collapse go.
+    """Coarsen a triangle mesh by vertex clustering: all vertices in a cell of a regular grid become one.
 
-    The volume is coarser than the surface, and fTetWild's running time follows the surface it is given.
+    The running time of fTetWild depends on the surface it is given, and the volume is coarser than the surface anyway.
 
     Parameters
     ----------
     points : (n, 3) float64
+        Vertices.
     faces : (m, 3) int64
+        Triangles.
     cell : float
-        Edge length of the grid's cells.
+        Edge length of the grid's cells, in the units of the points.
 
     Returns
     -------
-    (k, 3) float64 and (l, 3) int64
-        Vertices in use (means of their cells) and distinct triangles of three distinct vertices.
+    vertices : (k, 3) float64
+        Mean of the vertices of each cell that is in use.
+    triangles : (l, 3) int64
+        Distinct triangles with three distinct corners; collapsed ones are dropped.
     """
     used, corners = np.unique(faces, return_inverse=True)
     _, cell_of = np.unique(np.floor(points[used] / cell).astype(np.int64), axis=0, return_inverse=True)
@@ -101,12 +106,12 @@ def cluster(points: Floats, faces: Ints, cell: float) -> tuple[Floats, Ints]:
 
 
 def run_child(arrays: dict[str, Floats | Ints], time_limit: float) -> tuple[Floats, Ints]:
-    """Run the child program on ``arrays``; return positions (N, 3) and tetrahedra (M, 4).
+    """Run the child process on ``arrays``; return vertices (N, 3) and tetrahedra (M, 4).
 
     Raises
     ------
     MeshingError
-        Whatever way the child failed.
+        If fTetWild is unavailable, or if the child fails in any way.
     """
     reason = unavailable_reason()
     if reason is not None:

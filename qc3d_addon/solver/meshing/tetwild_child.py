@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run fTetWild once: the only code that touches pytetwild.
+"""Runs fTetWild once. This is the only code that uses pytetwild.
 
-A process of its own, because pytetwild keeps the interpreter locked while it works, cannot be cancelled, removes the
-interrupt handler, and may exit or crash from C++. Started by :mod:`qc3d_addon.solver.meshing.tetwild`, which says
-what the files hold::
+It is a separate process because pytetwild holds the GIL while it works, cannot be canceled, removes the interrupt
+handler, and may exit or crash from C++. It is started by :mod:`qc3d_addon.solver.meshing.tetwild`, which defines the
+contents of the files::
 
     python -I tetwild_child.py WRAPPER NUMPY FOLDER SECONDS
 
-WRAPPER is the file of pytetwild's compiled module, loaded on its own because the package around it needs pyvista;
-NUMPY is the folder that holds numpy; FOLDER is where the input's .npy files lie and ``output.npz`` goes; SECONDS is
-a limit that holds even if nobody is left to enforce it. Without FOLDER and SECONDS it loads the module and no more.
+WRAPPER is the file of pytetwild's compiled module, which is loaded without the package around it because that needs
+pyvista. NUMPY is the folder that contains numpy. FOLDER contains the input as .npy files and receives ``output.npz``.
+SECONDS is a time limit that holds even if no parent is left to enforce it. Without FOLDER and SECONDS, the program only
+loads the module.
 """
 
 from __future__ import annotations
@@ -37,13 +38,13 @@ def main(arguments: list[str]) -> None:
     import numpy as np
 
     arrays = {file.stem: np.load(file, allow_pickle=False) for file in folder.glob("*.npy")}
-    # The compiled function takes its arguments by position only; the comments are the names pytetwild gives them.
+    # The compiled function takes positional arguments only; the comments give pytetwild's names for them.
     points, tets = _load(wrapper).tetrahedralize_mesh(
         arrays["points"],
         arrays["faces"].astype(np.uint32),
         True,  # optimize
-        True,  # skip_simplify: the surface comes simplified, and simplifying drops the vertices that set the box
-        0.05,  # edge_length_r, unused because edge_length_abs is given
+        True,  # skip_simplify: the surface is coarse already, and simplifying would drop the two vertices of the box
+        0.05,  # edge_length_r: unused because edge_length_abs is given
         float(arrays["edge_length"]),  # edge_length_abs
         float(arrays["epsilon"]),
         10.0,  # stop_energy
@@ -58,10 +59,10 @@ def main(arguments: list[str]) -> None:
         arrays["size_tets"].astype(np.int32),
         arrays["size_values"],
     )
-    # Not straight into the file: what is left of an archive that could not be written says more than why.
+    # Via memory: if the disk is full, writing bytes raises a clear error, writing an archive does not.
     archive = BytesIO()
     np.savez(archive, points=points, tets=tets)
-    # Renamed when complete: a crash while writing must not look like a result.
+    # Renamed when complete, so that a crash while writing cannot look like a result.
     (folder / "unfinished.npz").write_bytes(archive.getvalue())
     os.replace(folder / "unfinished.npz", folder / "output.npz")
 

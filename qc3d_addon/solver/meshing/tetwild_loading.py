@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where pytetwild's compiled module is, and how a child process loads it; imports neither it nor any other library."""
+"""Finds pytetwild's compiled module and the command that loads it in a child process, without importing anything."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CHILD = Path(__file__).resolve().with_name("tetwild_child.py")
 
 
 def unavailable_reason() -> str | None:
-    """Why fTetWild cannot run here, as a clause, or None if it can; loads nothing."""
+    """Why fTetWild cannot run here, as a clause for a sentence; None if nothing speaks against it. Loads nothing."""
     if _wrapper() is None:
         return "pytetwild is not installed for this Python"
     if interpreter() is None:
@@ -23,9 +23,9 @@ def unavailable_reason() -> str | None:
 
 
 def load_command() -> list[str]:
-    """The command that loads fTetWild in a child process and does no more: its exit status is 0 where that works.
+    """The command that only loads fTetWild in a child process; its exit status is 0 if that works.
 
-    Only where ``unavailable_reason()`` is None.
+    Call it only if ``unavailable_reason()`` is None.
     """
     numpy = importlib.util.find_spec("numpy")
     assert numpy is not None

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations, symmetric matrices, sparse systems: what knows nothing of meshes and keys."""
+"""Linear algebra that knows nothing of meshes or keys: rotations, symmetric matrices, sparse systems."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sparsity pattern of a simplicial mesh, built once, matrices scattered into it, and its gradient operator."""
+"""Finite-element assembly: a sparsity pattern built once and filled many times, and the gradient operator."""
 
 from __future__ import annotations
 
@@ -13,14 +13,25 @@ from ..arrays import Floats, Ints
 
 
 class StiffnessPattern:
-    """Where the entries of element matrices land in a sparse N x N matrix.
+    """The sparsity pattern of a mesh's stiffness matrix: where each entry of an element matrix is added.
+
+    Build it once for a mesh, then assemble as many matrices as needed.
 
     Parameters
     ----------
     elements : (M, k) int64
-        Vertex indices of the elements (k = 3 triangles, 4 tetrahedra).
+        Vertex indices of the elements: k = 2 for edges, 3 for triangles, 4 for tetrahedra.
     count : int
         Number of vertices N.
+
+    Examples
+    --------
+    >>> pattern = StiffnessPattern(np.array([[0, 1], [1, 2]]), 3)
+    >>> spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    >>> pattern.assemble(np.stack([spring, spring])).toarray()
+    array([[ 1., -1.,  0.],
+           [-1.,  2., -1.],
+           [ 0., -1.,  1.]])
     """
 
     def __init__(self, elements: Ints, count: int) -> None:
@@ -46,22 +57,28 @@ class StiffnessPattern:
 
     @cached_property
     def _sums(self) -> csr_array:
-        """(entries, M k k): the entries of element matrices that meet in each entry of the sparse matrix."""
+        """(entries, M k k) matrix of ones that adds up the element entries belonging to each entry of the result."""
         order = np.argsort(self._slots, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(self._slots, minlength=len(self._columns)))])
         return csr_array((np.ones(len(order)), order, starts), shape=(len(self._columns), len(order)))
 
 
 def gradient_operator(elements: Ints, gradients: Floats, count: int) -> csr_array:
-    """(d m, count): takes values (count,) to their derivatives in the first direction on all elements, then the next.
+    """Sparse matrix that takes vertex values to their gradients, which are constant on each element.
 
     Parameters
     ----------
     elements : (m, k) int64
+        Vertex indices of the elements.
     gradients : (m, k, d)
-        Of the hat functions.
+        Gradients of the k hat functions of each element.
     count : int
-        How many vertices there are.
+        Number of vertices.
+
+    Returns
+    -------
+    (d m, count) sparse
+        The rows are ordered by direction: the derivatives along the first axis on all elements, then along the second.
     """
     directions = gradients.shape[2]
     columns = np.tile(elements, (directions, 1)).ravel()
@@ -72,6 +89,20 @@ def gradient_operator(elements: Ints, gradients: Floats, count: int) -> csr_arra
 
 
 def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats | None = None) -> Floats:
-    """(M, k, k) element matrices v G A G^T of the operator -div(A grad); A = identity where it is not given."""
+    """Element matrices v G A Gᵀ of the operator -div(A grad).
+
+    Parameters
+    ----------
+    volumes : (M,)
+        Volume, area or length v of each element.
+    gradients : (M, k, d)
+        Gradients G of the hat functions.
+    conductivity : (M, d, d), optional
+        Symmetric matrices A; the identity by default.
+
+    Returns
+    -------
+    (M, k, k)
+    """
     flux = gradients if conductivity is None else gradients @ conductivity
     return np.asarray(volumes[:, None, None] * (flux @ gradients.transpose(0, 2, 1)))

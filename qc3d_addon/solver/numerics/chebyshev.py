@@ -1,23 +1,35 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixed-point iterations made quicker by fixed weights: what they reach depends smoothly on what they start at."""
+"""Chebyshev acceleration of fixed-point iterations.
+
+The weights are fixed in advance, so the result depends smoothly on the starting point. Adaptive schemes such as
+Anderson mixing do not have that property: in-betweens computed with them jump from one time to the next.
+"""
 
 from __future__ import annotations
 
 from ..arrays import Floats
 
+# The first steps are not accelerated: until the fast-decaying errors are gone, the iteration is far from linear (Wang
+# 2015 delays the start for the same reason).
 _PLAIN_STEPS = 3
 
 
 class ChebyshevIteration:
-    """The next point of a fixed-point iteration from the last two (Golub & Varga 1961; for shapes Wang 2015).
+    """Chebyshev semi-iterative method: computes the next point of a fixed-point iteration from the last two.
 
     Parameters
     ----------
     radius : float
-        How much an error is taken to shrink in each step of the iteration itself, 0..1.
+        Assumed spectral radius of the plain iteration, 0..1: the factor by which one step shrinks the slowest error.
     relaxation : float
-        How far to go along a step; above 1 goes further than it asks for.
+        Factor on each step; above 1 over-relaxes.
+
+    References
+    ----------
+    Golub & Varga, "Chebyshev semi-iterative methods, successive overrelaxation iterative methods, and second order
+    Richardson iterative methods", 1961. Wang, "A Chebyshev semi-iterative approach for accelerating projective and
+    position-based dynamics", 2015.
     """
 
     def __init__(self, radius: float, relaxation: float) -> None:
@@ -28,7 +40,7 @@ class ChebyshevIteration:
         self._before: Floats | None = None
 
     def next(self, point: Floats, mapped: Floats) -> Floats:
-        """The point after ``point``, which the iteration takes to ``mapped``; arrays of any one shape."""
+        """The next point, given the present ``point`` and what the plain iteration maps it to; any array shape."""
         if self._steps == _PLAIN_STEPS:
             self._weight = 2.0 / (2.0 - self._square)
         elif self._steps > _PLAIN_STEPS:

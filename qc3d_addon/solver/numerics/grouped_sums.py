@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums and means of values that carry labels: of vertices by component, of corners by vertex."""
+"""Sums and means of values grouped by integer labels, such as vertices by component or corners by vertex."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from ..arrays import Floats, Ints
 
 
 def sums_by_label(labels: Ints, values: Floats, count: int = 0) -> Floats:
-    """Sums of the values that carry each label.
+    """Sum of the values of each group.
 
     Parameters
     ----------
     labels : (n,) int64
-        0, 1, 2, ...
+        Group of each value: 0, 1, 2, ...
     values : (n,) or (n, c)
     count : int
-        How many labels there are at least; those that nothing carries have the sum 0.
+        Least number of groups in the result; the sum of an empty group is 0.
 
     Returns
     -------
-    (labels,) or (labels, c)
+    (groups,) or (groups, c)
 
     Examples
     --------
@@ -35,9 +35,9 @@ def sums_by_label(labels: Ints, values: Floats, count: int = 0) -> Floats:
 
 
 def means_by_label(labels: Ints, values: Floats, weights: Floats | None = None, count: int = 0) -> Floats:
-    """(labels, c) means of the rows of ``values`` (n, c) that carry each label, weighted by ``weights`` (n,).
+    """(groups, c) weighted mean of the rows of ``values`` (n, c) in each group; ``weights`` (n,) are 1 by default.
 
-    Zero where nothing carries a label, or its weights add up to nothing.
+    The mean of an empty group, or of one whose weights are all zero, is 0.
     """
     weight = np.ones(len(labels)) if weights is None else weights
     total = np.maximum(sums_by_label(labels, weight, count), 1e-300)
@@ -45,6 +45,6 @@ def means_by_label(labels: Ints, values: Floats, weights: Floats | None = None, 
 
 
 def covariances_by_label(labels: Ints, first: Floats, second: Floats, count: int = 0) -> Floats:
-    """(labels, 3, 3) sums of the outer products first secondᵀ of the rows (n, 3) that carry each label."""
+    """(groups, 3, 3) sum, over each group, of the outer products first secondᵀ of rows (n, 3)."""
     products = (first[:, :, None] * second[:, None, :]).reshape(-1, 9)
     return sums_by_label(labels, products, count).reshape(-1, 3, 3)

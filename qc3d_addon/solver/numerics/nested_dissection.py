@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sparse symmetric positive definite systems, factored in an order that keeps their factors small."""
+"""Sparse symmetric positive definite systems: fill-reducing elimination orders, and factorization."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from scipy.sparse.linalg import SuperLU, splu
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
 
-_LEAF = 32  # parts of so few unknowns are not cut any more
-# An unknown with more ties than so many times the square root of their number comes last of all, as in AMD (Amestoy,
-# Davis & Duff 1996): all those tied to one such would be separators.
+_LEAF = 32  # parts with at most this many unknowns are not dissected further: fill-in inside them is negligible
+# Unknowns with more than this many times sqrt(n) neighbors are eliminated last, as in AMD (Amestoy, Davis & Duff 1996):
+# otherwise all their neighbors would end up in separators.
 _DENSE = 10.0
-# Work is the sum of the cubes of separators. Little of it is not worth a second order. The most is about half a minute
-# of one core or, for very large surfaces, which need about 14 for each unknown to the power 3/2, some times that.
+# Work is estimated as the sum of the cubes of the separators' sizes. Below _LITTLE_WORK a second order is not worth
+# trying. _MOST_WORK takes about half a minute on one core. Very large surfaces need about 14 n^(3/2), so for them the
+# limit is a few times that.
 _LITTLE_WORK, _MOST_WORK, _MOST_PER_UNKNOWN = 1e9, 5e10, 50.0
-_MUCH_LESS = 0.1
+_MUCH_LESS = 0.1  # a banded factorization has longer rows to process, so it must promise a clear gain
 
 
 def elimination_order(points: Floats, matrix: csr_array) -> Ints:
-    """The order in which unknowns are eliminated with little work.
+    """Fill-reducing order in which to eliminate the unknowns of a sparse system.
 
-    By nested dissection. Where its cuts run along thin triangles, so that thousands of unknowns have to be eliminated
-    at once, Cuthill & McKee's order, which looks at ties alone, is taken if that is much better.
+    Nested dissection by coordinates. On meshes with long thin triangles its separators can become very large; then the
+    reverse Cuthill-McKee order, which depends on connectivity alone, is used if it is much cheaper.
 
     Parameters
     ----------
     points : (n, 3)
-        Where the unknowns are.
+        Positions of the unknowns.
     matrix : (n, n) sparse
-        Only its pattern counts; symmetric.
+        Symmetric; only its sparsity pattern matters.
 
     Returns
     -------
@@ -43,7 +44,7 @@ def elimination_order(points: Floats, matrix: csr_array) -> Ints:
     Raises
     ------
     InputError
-        If unknowns are tied to others from all over the place, so that factoring the matrix would take very long.
+        If so many unknowns far from each other are coupled that factoring the matrix would take too long.
     """
     few = np.diff(matrix.indptr) <= _DENSE * np.sqrt(len(points))
     chosen, many = np.flatnonzero(few), np.flatnonzero(~few)
@@ -55,8 +56,8 @@ def elimination_order(points: Floats, matrix: csr_array) -> Ints:
 
 
 def _easier(order: Ints, separators: list[tuple[Ints, Ints]], matrix: csr_array) -> Ints:
-    """The order that was found by dissection, with these separators, or another one that is much less work."""
-    # A separator becomes dense only as far as it hangs together.
+    """The order found by dissection, which has these separators, or the banded one where that is much less work."""
+    # Only the connected parts of a separator become dense blocks.
     component = connected_components(matrix, directed=False)[1]
     work = 0.0
     for part, unknowns in separators:
@@ -82,15 +83,15 @@ def _easier(order: Ints, separators: list[tuple[Ints, Ints]], matrix: csr_array)
 def _dissected(points: Floats, matrix: csr_array) -> tuple[Ints, list[tuple[Ints, Ints]]]:
     """Nested dissection by coordinates (George 1973, "Nested dissection of a regular finite element mesh").
 
-    Every part is cut in halves of equal size across its longest side; the unknowns on one side of the cut that are
-    tied to the other side are the separator and come after both halves. All parts of one depth are cut at once.
+    Each part is bisected across its longest extent. The unknowns on one side that are coupled to the other side form
+    the separator, which is eliminated after both halves. All parts of one level are bisected at once.
 
     Returns
     -------
     order : (n,) int64
         The unknowns in the order of elimination.
     separators : list
-        For each depth the part that each separating unknown is in, and which unknown it is.
+        For each level, the part that each separator unknown belongs to, and the index of that unknown.
     """
     count = len(points)
     entries = matrix.tocoo()
@@ -98,7 +99,7 @@ def _dissected(points: Floats, matrix: csr_array) -> tuple[Ints, list[tuple[Ints
     part = np.zeros(count, dtype=np.int64)
     inner: Bools = np.ones(count, dtype=bool)
     depth = max(0, int(np.ceil(np.log2(max(count, 1) / _LEAF))))
-    # Of each unknown at each depth: the half it is in, 0 or 1, or 2 where it became part of a separator.
+    # For each level and unknown: 0 or 1 for the half that it is in, 2 if it became part of a separator.
     places = np.zeros((depth, count), dtype=np.int8)
     separators = []
     for level in range(depth):
@@ -118,7 +119,7 @@ def _dissected(points: Floats, matrix: csr_array) -> tuple[Ints, list[tuple[Ints
 
 
 def _halves(points: Floats, part: Ints) -> Ints:
-    """(n,) 0 or 1: the halves of each part, of equal size, along its longest side."""
+    """(n,) 0 or 1: which half of its part each point is in; halves have equal size, split across the longest extent."""
     _, part = np.unique(part, return_inverse=True)
     by_part = np.argsort(part, kind="stable")
     sizes = np.bincount(part)
@@ -133,6 +134,6 @@ def _halves(points: Floats, part: Ints) -> Ints:
 
 
 def factored(matrix: csr_array) -> SuperLU:
-    """LU factors of a symmetric positive definite matrix whose rows are in the order of elimination already."""
-    # Positive definite: the pivots may stay on the diagonal.
+    """LU factors of a symmetric positive definite matrix whose rows are already in the order of elimination."""
+    # No pivoting is needed for a positive definite matrix: the pivots stay on the diagonal.
     return splu(csc_array(matrix), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

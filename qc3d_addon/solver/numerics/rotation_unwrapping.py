@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Consistent branches of rotation vectors over a mesh: turns beyond 180 degrees, and neighbours that agree.
+"""Unwrapping of rotations over a mesh: angles beyond 180 degrees that agree between neighboring elements.
 
-The rotation of one element tells its angle only up to full turns. Neighbouring elements turn alike, so the branch is
-carried from element to element along a spanning tree that crosses the smallest relative rotations first.
+A rotation matrix determines its angle only up to full turns. Since neighboring elements turn by similar angles, the
+branch of the rotation vector is propagated from element to element along a minimum spanning tree of the relative
+rotations.
 """
 
 from __future__ import annotations
@@ -22,19 +23,21 @@ from ..arrays import Bools, Floats, Ints
 from .grouped_sums import covariances_by_label, sums_by_label
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
+# Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
 _MOST_SWING = 1.55 * np.pi
+# Share of a part's weight that must turn further than that: a few badly shaped triangles must not decide for the part.
 _FAIR_SHARE = 0.02
-_DIGITS = 9
-_MEAN_STEPS = 30
-_MEAN_FOUND = 1e-13  # radians
+_DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
+_MEAN_STEPS = 30  # a cap: rotations that are spread all around may have no unique mean
+_MEAN_FOUND = 1e-13  # radians; about the rounding of rotation vectors
 
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """How elements turn with time: R_t = exp(t swing) exp(t twist).
+    """Rotations of elements over time: R(t) = exp(t swing) exp(t twist).
 
-    The twist is about one axis for a whole part of the surface and of any number of turns; the swing is what is left.
-    A part that turns less has no twist, its swing is the whole rotation.
+    All elements of a part share the axis of the twist, whose angle is not limited; the swing is the remaining rotation.
+    A part that turns by less than about three quarters of a turn has no twist.
 
     Parameters
     ----------
@@ -54,11 +57,11 @@ class Turning:
 
     @property
     def angles(self) -> Floats:
-        """(m,) how far each element turns, radians."""
+        """(m,) angle by which each element turns in all, radians."""
         return self.angles_from(np.zeros(3))
 
     def angles_from(self, rest: Floats) -> Floats:
-        """(m,) how far each element turns beside what turns by ``rest`` (3,), a rotation vector in radians."""
+        """(m,) angle by which each element turns relative to the rotation vector ``rest`` (3,), radians."""
         parts = (self.swing, self.twist) if self.twist.any() else (self.swing - rest,)
         return np.asarray(np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0))
 
@@ -66,32 +69,32 @@ class Turning:
 def consistent_turning(
     turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats
 ) -> Turning:
-    """Turn every element so that neighbours agree, beyond 180 degrees and beyond 360 where they do.
+    """Unwrap the rotations of all elements, so that neighbors agree, also beyond 180 and 360 degrees.
 
     Parameters
     ----------
     turns : (m, 3)
-        Rotation vectors, angles in [0, pi].
+        Rotation vectors, radians, with angles in [0, pi].
     adjacency : (k, 2) int64
-        Pairs of neighbouring elements.
+        Pairs of neighboring elements.
     centres : (m, 3)
-        Where the elements are, for parts that hang together with nothing.
+        Centroids of the elements; they relate parts that are not connected.
     weights : (m,)
-        What elements count in the axis of their part.
+        Positive weights of the elements when the axis of their part is computed.
     held : (m,) bool
-        Elements that touch what both keys leave in place.
+        Whether an element has a still vertex.
     rest : (3,)
-        Rotation vector of what both keys leave in place: nothing, unless a motion of the whole was taken out.
+        Rotation vector of what is still: zero unless a motion of the whole was removed.
 
     Notes
     -----
-    The rotation vector of an element is followed to its neighbours by the nearest branch, which is right up to a full
-    turn: there the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
+    The rotation vector of a neighbor is moved to the branch nearest to that of the element. This works up to a full
+    turn, where the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
     into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
-    Within a part the element that turns least, or most nearly as what rests where something holds the part, goes the
-    short way round. A part that nothing holds, such as a button on a sleeve, goes the way that the surface of the
-    largest part does where it is nearest.
+    In each part the element that turns least takes the short way round; in a part with still vertices the one whose
+    rotation is nearest to ``rest``. A part without still vertices, such as a button on a sleeve, takes the branch of the
+    nearest element of the largest part.
     """
     count = len(turns)
     if not count:
@@ -114,20 +117,20 @@ def consistent_turning(
 
 
 def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
-    """Rotation vector (3,), the short way round, of the mean of rotations that are unwrapped about it.
+    """Rotation vector (3,), angle in [0, pi], of the Karcher mean of unwrapped rotations.
 
-    The Karcher mean: the rotation beside which the turns of the elements add up to nothing. Beside it every part is
-    unwrapped from its element that turns least, so that ends twisted by more than half a turn either way cancel out,
-    where the best fit of positions would be a tie between all directions.
+    Relative to the Karcher mean, the weighted rotation vectors of the elements sum to zero. They are unwrapped relative
+    to the mean in every iteration. So two ends that are twisted by more than half a turn in opposite directions cancel
+    out, where a least-squares fit of the positions would leave the rotation undetermined.
 
     Parameters
     ----------
     turns : (m, 3)
-        Rotation vectors, angles in [0, pi]; at least one.
+        Rotation vectors, radians, with angles in [0, pi]; at least one.
     adjacency : (k, 2) int64
-        Pairs of neighbouring elements.
+        Pairs of neighboring elements.
     weights : (m,)
-        What elements count; positive somewhere.
+        Weights of the elements, not all zero.
 
     References
     ----------
@@ -148,7 +151,7 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
 
 
 def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, loose: Bools) -> Floats:
-    """Rotation vectors (m, 3) with every loose part in the branch that is nearest to the largest part's."""
+    """Rotation vectors (m, 3) with every loose part moved to the branch nearest to that of the largest part."""
     largest = forest.labels == np.argmax(np.bincount(forest.labels))
     others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
     if not len(others):
@@ -160,7 +163,7 @@ def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, loose: Bo
 
 
 def swing_beside(turns: Floats, twist: Floats) -> Floats:
-    """(m, 3) rotation vectors of what rotations (m, 3) are beside a twist (m, 3), the short way round."""
+    """(m, 3) rotation vectors, angles in [0, pi], of the swing R exp(-twist) of rotations R given as vectors (m, 3)."""
     return rotation_vectors(rotation_matrices(turns) @ rotation_matrices(-twist))
 
 
@@ -169,27 +172,26 @@ def _nearest_phase(phases: Floats, references: Floats) -> Floats:
 
 
 def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
-    """(parts, 3) unit axes about which the parts turn most, pointing the way in which they turn."""
+    """(parts, 3) unit axis about which each part turns most, oriented along its mean rotation."""
     axes = np.linalg.eigh(covariances_by_label(labels, weights[:, None] * vectors, vectors))[1][:, :, 2]
     along = sums_by_label(labels, weights * np.einsum("ki,ki->k", vectors, axes[labels]))
     return np.asarray(axes * np.where(along < 0.0, -1.0, 1.0)[:, None])
 
 
 class _Forest:
-    """A spanning tree of each connected part, over the smallest relative rotations."""
+    """Minimum spanning trees of the relative rotations, one for each part."""
 
     def __init__(self, turns: Floats, adjacency: Ints) -> None:
         count = len(turns)
-        first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 takes no others
-        # A relative rotation of zero must still count as an edge of the graph; which of several alike are taken must
-        # not depend on rounding.
+        first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 accepts no other index type
+        # Sparse graphs drop edges of cost zero.
         cost = np.round(_relative_angles(turns[first], turns[second]), _DIGITS) + 10.0**-_DIGITS
         tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
         self.labels: Ints = np.asarray(connected_components(tree, directed=False)[1], dtype=np.int64)
         self._edges: list[Ints] = [end.astype(np.int64) for end in tree.nonzero()]
 
     def rooted(self, angles: Floats) -> _Forest:
-        """The same trees, each rooted where the angles (m,) are smallest."""
+        """The same trees, each rooted at the element with the smallest of ``angles`` (m,)."""
         other = copy.copy(self)
         other._root(angles)
         return other
@@ -198,7 +200,7 @@ class _Forest:
         count, labels = len(angles), self.labels
         by_angle = np.lexsort((np.round(angles, _DIGITS), labels))
         self.roots: Ints = by_angle[np.searchsorted(labels[by_angle], np.arange(labels.max() + 1))]
-        # One more node joins all roots, so that one search covers every part.
+        # An extra node joins all roots, so that one breadth-first search covers every part.
         rows, columns = self._edges
         rows = np.concatenate([rows, np.full(len(self.roots), count)])
         columns = np.concatenate([columns, self.roots])
@@ -209,7 +211,7 @@ class _Forest:
         self._starts = np.searchsorted(depth[self._by_depth], np.arange(2, depth.max() + 2))
 
     def carried(self, values: Floats, align: Callable[[Floats, Floats], Floats]) -> Floats:
-        """Walk outwards from the roots, a generation at a time, aligning each value with its parent's."""
+        """Walk outward from the roots, level by level, aligning each value with that of its parent."""
         result = values.copy()
         for begin, end in pairwise(self._starts):
             members = self._by_depth[begin:end]
@@ -218,7 +220,7 @@ class _Forest:
 
 
 def _depths(order: Ints, parents: Ints) -> Ints:
-    """Distance from the root of every node of a breadth-first order, by pointer doubling."""
+    """Depth of every node in the tree, by pointer doubling; ``order`` is breadth-first."""
     ancestor = parents.copy()
     ancestor[order[0]] = order[0]
     depth = np.ones(len(parents), dtype=np.int64)

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations of 3-space in batches: closest rotation, rotation vectors and back."""
+"""Batches of 3D rotations: closest rotations, rotation vectors, and small dense matrices.
+
+Many arrays here are component-major: an array of shape (k, ...) whose components are each contiguous in memory, so that
+inner loops over all k are contiguous too.
+"""
 
 from __future__ import annotations
 
@@ -8,27 +12,25 @@ import numpy as np
 
 from ..arrays import Floats
 
-_NEWTON_STEPS = 20
-_SMALL_ANGLE = 1e-4
-_NO_ANGLE = 1e-12  # below this the axis is lost to rounding
-# Cosines of half the angle below this are those of half a turn in single precision.
-_HALF_TURN = 1e-6
-# Across none of the axes that symmetric shapes are turned about.
-_HALF_TURN_SIDE = np.array([0.83, 0.46, 0.31])
+_NEWTON_STEPS = 20  # a cap; scaled Newton converges in about ten
+_SMALL_ANGLE = 1e-4  # radians; below this the first omitted term of the series, angle^4 / 120, is below rounding
+_NO_ANGLE = 1e-12  # radians; below this the axis is lost to rounding
+_HALF_TURN = 1e-6  # cosines of half the angle below this belong to half turns, up to rounding in single precision
+_HALF_TURN_SIDE = np.array([0.83, 0.46, 0.31])  # perpendicular to none of the axes that symmetric shapes turn about
 
 
 def by_component(matrices: Floats) -> Floats:
-    """The same array (k, ...), each component stored in one piece: operations on all k run along memory."""
+    """The same array (k, ...) in component-major storage: all k values of a component are contiguous in memory."""
     return np.asarray(np.moveaxis(np.ascontiguousarray(np.moveaxis(matrices, 0, -1)), -1, 0))
 
 
 def products(first: Floats, second: Floats) -> Floats:
-    """(k, i, l) products of matrices (k, i, j) and (k, j, l): faster than ``@`` where they are stored by component."""
+    """(k, i, l) products of matrices (k, i, j) and (k, j, l); faster than ``@`` for component-major arrays."""
     return np.asarray(np.einsum("kij,kjl->kil", first, second))
 
 
 def cofactors(matrices: Floats) -> Floats:
-    """(..., 3, 3) cofactor matrices: the gradient of the determinant, det(A) A^-T where A is regular."""
+    """(..., 3, 3) cofactor matrices of 3x3 matrices: det(A) A⁻ᵀ where A is regular; the gradient of det(A)."""
     result = np.empty_like(matrices)
     for row in range(3):
         one, other = (row + 1) % 3, (row + 2) % 3
@@ -42,17 +44,17 @@ def cofactors(matrices: Floats) -> Floats:
 
 
 def determinants(matrices: Floats) -> Floats:
-    """(...,) determinants of 3x3 matrices by expansion, many times faster than the batched LU."""
+    """(...,) determinants of 3x3 matrices, expanded: many times faster than numpy's batched LU."""
     (a, b, c), (d, e, f), (g, h, i) = ([matrices[..., row, column] for column in range(3)] for row in range(3))
     return np.asarray(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 
 
 def closest_rotations(matrices: Floats) -> Floats:
-    """(k, 3, 3) rotations closest to each matrix in the Frobenius norm.
+    """(k, 3, 3) rotations closest to matrices (k, 3, 3) in the Frobenius norm.
 
-    Scaled Newton iteration of the polar decomposition (Higham 1986) for matrices that keep orientation and are far
-    from singular; the singular value decomposition, with the sign of the determinant put into the last singular
-    value, for the rest.
+    Matrices that preserve orientation and are far from singular take the scaled Newton iteration for the polar
+    decomposition (Higham, "Computing the polar decomposition with applications", 1986). The rest take the singular
+    value decomposition, with the smallest singular value negated where the determinant is negative.
     """
     norms = np.sqrt(np.einsum("kij,kij->k", matrices, matrices))
     scaled = matrices / np.where(norms > 0.0, norms, 1.0)[:, None, None]
@@ -82,10 +84,10 @@ def _closest_rotations_svd(matrices: Floats) -> Floats:
 
 
 def rotation_vectors(rotations: Floats) -> Floats:
-    """(k, 3) rotation vectors (axis times angle, angle in [0, pi]) of rotation matrices.
+    """(k, 3) rotation vectors, axis times angle in radians, of rotation matrices (k, 3, 3); angles are in [0, pi].
 
-    Of the two ways to turn by half a turn it is always the same one, not the one that rounding prefers; the angle may
-    exceed pi by that much.
+    Of the two vectors of a half turn always the same one is returned, whatever the rounding; its angle may exceed pi by
+    2e-6.
     """
     quaternions = _quaternions(rotations)
     vector, scalar = quaternions[:, 1:], quaternions[:, 0]
@@ -95,9 +97,9 @@ def rotation_vectors(rotations: Floats) -> Floats:
 
 
 def _quaternions(rotations: Floats) -> Floats:
-    """(k, 4) unit quaternions, scalar first and not negative; stable for every angle (Shepperd 1978).
+    """(k, 4) unit quaternions with scalar part first and >= 0; stable for every angle (Shepperd 1978).
 
-    Where the scalar is zero but for rounding, the vector points the way of ``_HALF_TURN_SIDE``.
+    Where the scalar part is zero up to rounding, the vector part points towards ``_HALF_TURN_SIDE``.
     """
     diagonal = np.einsum("kii->ki", rotations)
     trace = diagonal.sum(axis=1)
@@ -111,7 +113,7 @@ def _quaternions(rotations: Floats) -> Floats:
     )
     symmetric = rotations + rotations.transpose(0, 2, 1)
     count = len(rotations)
-    # Row b of the table is 4 q_b q: every row is a valid answer, the longest one is the best conditioned.
+    # Row b of the table is 4 q_b q: each row is the quaternion up to scale, and the longest is the best conditioned.
     table = np.empty((count, 4, 4))
     table[:, 0, 0] = 1.0 + trace
     table[:, 0, 1:] = table[:, 1:, 0] = skew
@@ -126,9 +128,16 @@ def _quaternions(rotations: Floats) -> Floats:
 
 
 def rotation_matrices(vectors: Floats) -> Floats:
-    """(k, 3, 3) rotation matrices exp([q]x) of rotation vectors of any length (Rodrigues' formula).
+    """(k, 3, 3) rotation matrices exp([q]x) of rotation vectors (k, 3) of any length, in radians.
 
-    They are stored by component.
+    Rodrigues' formula. The result is component-major.
+
+    Examples
+    --------
+    >>> rotation_matrices(np.array([[0.0, 0.0, np.pi / 2]]))[0].round(12) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
     """
     x, y, z = np.ascontiguousarray(vectors.T)
     square = x * x + y * y + z * z
@@ -136,7 +145,7 @@ def rotation_matrices(vectors: Floats) -> Floats:
     small = angle < _SMALL_ANGLE
     safe = np.where(small, 1.0, angle)
     sine = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
-    # From half the angle: 1 - cos loses small angles to rounding.
+    # By the half-angle formula: 1 - cos cancels for small angles.
     cosine = np.where(small, 0.5 - square / 24.0, 2.0 * (np.sin(0.5 * safe) / safe) ** 2)
     matrices = np.empty((3, 3, len(vectors)))
     for axis, along in enumerate((x, y, z)):
@@ -148,10 +157,15 @@ def rotation_matrices(vectors: Floats) -> Floats:
 
 
 def nearest_branch(vectors: Floats, references: Floats) -> Floats:
-    """(k, 3) rotation vectors of the same rotations, turned by the multiple of 2 pi that is nearest to a reference.
+    """(k, 3) rotation vectors of the same rotations as ``vectors`` (k, 3), each on the branch nearest to its reference.
 
-    A rotation by the angle a about the unit axis u is also the one by a + 2 pi m, for every integer m. Where the
-    rotation is the identity, the axis is free and the reference's is taken.
+    A rotation by the angle a about an axis is also the rotation by a + 2 pi m, for every integer m. Where a rotation is
+    the identity, its axis is undetermined and that of the reference (k, 3) is used.
+
+    Examples
+    --------
+    >>> nearest_branch(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 7.0]])).round(4)
+    array([[0.    , 0.    , 7.2832]])
     """
     angle = np.linalg.norm(vectors, axis=1)
     reference_angle = np.linalg.norm(references, axis=1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stretches between the identity and a given symmetric matrix."""
+"""Symmetric positive definite matrices, and stretches interpolated between the identity and one of them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,20 @@ from ..arrays import Floats
 from ..settings import StretchLaw
 from .rotations import by_component, products
 
-_FLATTEST = 1e-16
+_FLATTEST = 1e-16  # of the largest eigenvalue: about one unit of rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Symmetric positive definite matrices by their eigenvalues (m, d) and eigenvectors (m, d, d), by component."""
+    """Symmetric positive definite matrices, stored as eigenvalues and eigenvectors, component-major.
+
+    Parameters
+    ----------
+    values : (m, d)
+        Eigenvalues, ascending, positive.
+    vectors : (m, d, d)
+        Eigenvectors in the columns.
+    """
 
     values: Floats
     vectors: Floats
@@ -26,13 +34,13 @@ class Stretch:
     def of(cls, matrices: Floats) -> Stretch:
         """Decompose (m, d, d) symmetric positive definite matrices."""
         values, vectors = np.linalg.eigh(matrices)
-        # Where something is flattened as far as numbers go, rounding must not make it negative.
+        # Rounding may make the smallest eigenvalue of a nearly singular matrix negative.
         return cls(by_component(np.maximum(values, _FLATTEST * values[:, -1:])), by_component(vectors))
 
     def at(self, time: float, law: StretchLaw) -> Floats:
-        """(m, d, d) stretches at ``time``: (1 - t) I + t P, or exp(t log P); positive definite for t in 0..1."""
+        """(m, d, d) stretches at ``time`` t in 0..1: (1 - t) I + t P, or exp(t log P) under the logarithmic law."""
         return self.assembled((1.0 - time) + time * self.values if law == "linear" else self.values**time)
 
     def assembled(self, values: Floats) -> Floats:
-        """(m, d, d) symmetric matrices with these eigenvectors and other eigenvalues (m, d)."""
+        """(m, d, d) symmetric matrices with the same eigenvectors and other eigenvalues (m, d)."""
         return products(self.vectors * values[:, None, :], self.vectors.transpose(0, 2, 1))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python that child processes run in."""
+"""The Python interpreter that child processes run in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from pathlib import Path
 
 
 def interpreter() -> Path | None:
-    """A Python like the running one; where Python is embedded, ``sys.executable`` may be the application."""
+    """Path of an interpreter of the same version as the running one, or None if none was found.
+
+    ``sys.executable`` is not enough: where Python is embedded, it may be the application, such as Blender.
+    """
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     suffix = sysconfig.get_config_var("EXE") or ""
     candidates = [Path(sys.executable)] if sys.executable else []

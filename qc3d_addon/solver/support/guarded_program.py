@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A program at work in a temporary folder, of which nothing is left when this process ends or is killed."""
+"""Runs a program in a temporary folder and leaves nothing behind, even if this process is killed."""
 
 from __future__ import annotations
 
@@ -17,35 +17,44 @@ from typing import NamedTuple
 from .child_python import interpreter
 
 GUARDIAN = Path(__file__).with_name("guardian.py")
-_PATIENCE = 10.0  # seconds for the guardian to clear up
+_PATIENCE = 10.0  # seconds that the guardian may take to kill the program and remove the folder
 
 
 class Ending(NamedTuple):
-    """How a program ended: its exit status, None where it took too long, and its last words on standard error."""
+    """How a program ended.
+
+    Parameters
+    ----------
+    status : int or None
+        Its exit status; None if it was stopped after its time limit.
+    words : str
+        The last line that it wrote to standard error.
+    """
 
     status: int | None
     words: str
 
 
-# What ends this process with all its group is not to end the guardian, unless somebody else clears up.
+# By default the guardian has a process group of its own: a signal that ends the whole group of this process must not
+# end the guardian, which still has to clean up.
 _in_own_group = True
 
 
 def share_group() -> None:
-    """Let guardians be in the group of this process, where another process ends the group and removes the folders."""
+    """Start guardians in the process group of this process, because another process ends the group and cleans up."""
     global _in_own_group
     _in_own_group = False
 
 
 class Guardian:
-    """Another process that watches this one; when this one ends, it kills the program and removes the folder.
+    """A helper process that runs one program. When this process ends, it kills the program and removes the folder.
 
-    It does so at the end of the ``with`` block too.
+    Use it in a ``with`` block; leaving the block does the same.
 
     Parameters
     ----------
     folder : Path
-        Where the program works.
+        The program's working folder.
 
     Raises
     ------
@@ -69,12 +78,12 @@ class Guardian:
         )
 
     def run(self, command: list[str], seconds: float) -> Ending:
-        """Run a program to its end, or for so many seconds; once for each guardian.
+        """Run a program to its end, but for at most ``seconds``. Call it once for each guardian.
 
         Raises
         ------
         OSError
-            If the guardian was killed.
+            If the guardian itself was killed.
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -89,7 +98,7 @@ class Guardian:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """End the program, if it still runs, and remove the folder."""
+        """Stop the program, if it still runs, and remove the folder."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with suppress(OSError):
@@ -99,7 +108,7 @@ class Guardian:
         except subprocess.TimeoutExpired:
             status = None
         self._process.stdout.close()
-        if status != 0:  # it was killed, or hangs: the program may still be there
+        if status != 0:  # the guardian was killed or hangs, so the program may still be running
             self._kill()
 
     def _kill(self) -> None:

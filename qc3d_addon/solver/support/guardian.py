@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run a program in a folder, and end both as soon as whoever asked for it is gone.
+"""Runs a program in a folder; kills it and removes the folder as soon as the parent process is gone.
 
-A process of its own, because the program may not be able to watch anybody: fTetWild keeps the interpreter locked while
-it works. Started by :mod:`.guarded_program`, which says what it is asked and answers::
+This is a separate process because the program may be unable to watch its parent: fTetWild holds the GIL while it
+works. It is started by :mod:`.guarded_program`, which also defines the request and the answer::
 
     python -I -S guardian.py FOLDER
 
-Standard input closes when the process that started this one ends, in whatever way, or wants no more: then the program
-is killed, FOLDER is removed, and this process ends.
+Standard input closes when the parent ends, however that happens, or when it has no further use for the program. Then
+the program is killed, FOLDER is removed, and this process ends.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LAST_WORDS = 300  # characters
 
 
 def main(folder: str) -> None:
-    """Carry out at most one request, then wait until nobody is there any more."""
+    """Carry out at most one request, then wait until standard input closes, and remove the folder."""
     request = sys.stdin.buffer.readline()
     if request.endswith(b"\n"):
         asked = json.loads(request)
@@ -37,9 +37,9 @@ def main(folder: str) -> None:
 
 
 def _carry_out(folder: str, command: list[str], seconds: float) -> tuple[dict[str, int | str | None], threading.Thread]:
-    """How the program ended, and the thread that ends with whoever asked for it.
+    """Run the program; return how it ended, and the thread that waits for the parent to go.
 
-    The exit status is None where it took too long; the words are the last line that it wrote to standard error.
+    The status is None if the program was stopped after ``seconds``; the words are its last line on standard error.
     """
     running: list[subprocess.Popen[bytes]] = []
     watcher = threading.Thread(target=_kill_when_nobody_is_there, args=(running,))
@@ -65,7 +65,7 @@ def _start(command: list[str], folder: str) -> subprocess.Popen[bytes]:
         flags = subprocess.CREATE_NO_WINDOW
     return subprocess.Popen(
         command,
-        cwd=folder,  # fTetWild writes files of its own where it runs
+        cwd=folder,  # fTetWild writes files of its own into the working folder
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much memory a bake will need, how much the machine has, and the most that this process has held."""
+"""Memory: how much a job will need, how much the machine has, and the peak of this process."""
 
 from __future__ import annotations
 
@@ -10,31 +10,35 @@ import sys
 from ..errors import InputError
 from ..settings import Quality
 
-# Measured by benchmarks/large.py, with a margin; docs/limits.md has the figures.
+# Measured by benchmarks/large.py, with a margin; docs/guide/limits.md has the figures.
 _MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0}
-_KB_PER_VERTEX = 4.3  # of every pair: the surface's factors and the frames that are worked on at once
-_BYTES_PER_POSITION = 110.0  # of every vertex in every frame: positions, measures, and what makes them
-_MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # of mode straight, where crossings are counted
-_MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # analyze, reconstruct, compress and decompress
+_KB_PER_VERTEX = 4.3  # for each pair: the factors of the surface's matrix, and the frames that are computed at once
+_BYTES_PER_POSITION = 110.0  # for each vertex in each frame: positions, measures, and temporary arrays
+_MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only counts crossings
+_MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress
 _KB_PER_FRAME, _BYTES_PER_COMPRESSED = 5.0, 220.0
-_SHARE_OF_MACHINE = 0.75
+_SHARE_OF_MACHINE = 0.75  # leaves a quarter for Blender and the system
 
 
 def estimated_mb(
     vertices: int, pairs: int, frames: int, quality: Quality, needs_maps: bool = True, triangles: int = 0
 ) -> float:
-    """About the most megabytes that a bake holds at once.
+    """Estimated peak memory of a bake, in megabytes.
 
     Parameters
     ----------
-    vertices, pairs, frames
-        Of the mesh, of keys that follow each other, and to be made.
-    quality
-        How fine the volume is.
-    needs_maps
-        Whether there is a map of the volume at all.
-    triangles
-        Of the mesh: where these are more than two for each vertex, they decide.
+    vertices : int
+        Vertices of the mesh.
+    pairs : int
+        Pairs of consecutive keys.
+    frames : int
+        Frames to compute.
+    quality : Quality
+        Resolution of the volume.
+    needs_maps : bool
+        Whether the volume is mapped at all; mode straight needs no map.
+    triangles : int
+        Triangles of the mesh; they count where there are more than two for each vertex.
     """
     positions = vertices * frames * _BYTES_PER_POSITION / 1e6
     size = max(vertices, triangles / 2)
@@ -44,12 +48,12 @@ def estimated_mb(
 
 
 def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
-    """Check that a bake fits into memory, before it starts.
+    """Check, before a bake of ``vertices`` starts, that its estimated memory is within the limit.
 
     Raises
     ------
     InputError
-        If the estimate is above the limit.
+        If it is not.
     """
     if needed_mb > limit_mb:
         raise InputError(
@@ -60,24 +64,24 @@ def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
 
 
 def require_memory_for_tets(points: int, tets: int, held: int) -> None:
-    """Check that a mesh of tetrahedra, with arrays of ``held`` bytes, can be worked on, before it is read.
+    """Check, before a tetrahedral mesh with arrays of ``held`` bytes is read, that the machine can process it.
 
     Raises
     ------
     InputError
-        If it is too large for this machine.
+        If three quarters of the machine's memory would not be enough.
     """
     needed = _MB_OF_A_COMMAND + max(points, tets) * _KB_PER_TET / 1e3 + 2.0 * held / 1e6
     _require(needed, f"A mesh of {tets} tetrahedra and {points} vertices", "use a coarser mesh")
 
 
 def require_memory_for_frames(frames: int, vertices: int) -> None:
-    """Check that frames can be compressed or restored, before they are read.
+    """Check, before frames are read, that the machine can compress or decompress them.
 
     Raises
     ------
     InputError
-        If they are too many or too large for this machine.
+        If three quarters of the machine's memory would not be enough.
     """
     needed = _MB_OF_A_COMMAND + frames * (_KB_PER_FRAME / 1e3 + vertices * _BYTES_PER_COMPRESSED / 1e6)
     _require(needed, f"Work on {frames} frames of {vertices} vertices", "use fewer frames or a coarser mesh")
@@ -93,20 +97,20 @@ def _require(needed_mb: float, what: str, remedy: str) -> None:
 
 
 def machine_limit_mb() -> int:
-    """Megabytes that a bake may use where nobody says otherwise: three quarters of the memory, 0 where not known."""
+    """Default memory limit of a bake in megabytes: three quarters of the machine's memory, or 0 if that is unknown."""
     try:
         total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
+    except (AttributeError, ValueError, OSError):  # this system does not tell
         return 0
     return int(_SHARE_OF_MACHINE * total / 2**20)
 
 
 def peak_memory_mb() -> float | None:
-    """Peak resident memory of this process in megabytes, None where the system does not tell (Windows)."""
+    """Peak resident memory of this process in megabytes; None on Windows, which does not tell."""
     try:
         import resource
     except ImportError:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    # macOS counts bytes, the others kilobytes.
+    # macOS reports bytes, other systems kilobytes.
     return peak / 2**20 if sys.platform == "darwin" else peak / 2**10

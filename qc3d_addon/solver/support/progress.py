@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work as generators that say how far it is, can be dropped at any of their steps, and time their stages."""
+"""Progress of long work.
+
+Long work is a generator that yields ``Progress`` and returns its result. It can be dropped at any of its steps.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +17,13 @@ Step = TypeVar("Step")
 
 
 class Stage(NamedTuple):
-    """What a stage is called, and about how much of a bake of one pair of keys it takes, 0..1."""
+    """A stage's label in the user interface, and its approximate share of the time of a one-pair bake, 0..1."""
 
     label: str
     share: float
 
 
-# The stages of a fit, which come again for every pair of keys, and those of frames, which come once.
+# The stages of a fit are repeated for every pair of keys; those of the frames come once, at the end.
 FIT_STAGES = {
     "mesh": Stage("Filling the volume", 0.45),
     "locate": Stage("Finding the surface in it", 0.02),
@@ -34,17 +37,18 @@ STAGES = FIT_STAGES | FRAME_STAGES
 
 
 class Progress(NamedTuple):
-    """Where the work is.
+    """How far the work is.
 
     Parameters
     ----------
-    stage
-        One of ``STAGES``.
-    fraction
-        How much of that stage is done, 0..1.
-    fit, fits
-        Number of the fit that the stage belongs to, 0 the first, and how many there are in all; stages of frames come
-        after all of them.
+    stage : str
+        A key of ``STAGES``.
+    fraction : float
+        Finished share of that stage, 0..1.
+    fit : int
+        Index of the fit that the stage belongs to, from 0.
+    fits : int
+        Number of fits in all; the stages of the frames come after all of them.
     """
 
     stage: str
@@ -54,7 +58,7 @@ class Progress(NamedTuple):
 
     @property
     def overall(self) -> float:
-        """How much of all the work is done, 0..1; it never falls."""
+        """Finished share of all the work, 0..1; it never decreases from one step to the next."""
         each = sum(stage.share for stage in FIT_STAGES.values())
         frames = sum(stage.share for stage in FRAME_STAGES.values())
         stages = FIT_STAGES if self.stage in FIT_STAGES else FRAME_STAGES
@@ -67,7 +71,7 @@ class Progress(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The stage in words, with the number of the fit where there are several."""
+        """The stage's label, with the number of the fit if there are several."""
         label = STAGES[self.stage].label
         return f"{label} ({self.fit + 1} of {self.fits})" if self.fits > 1 and self.stage in FIT_STAGES else label
 
@@ -76,7 +80,17 @@ Steps = Generator[Progress, None, T]
 
 
 def finish(steps: Generator[Step, None, T], on_progress: Callable[[Step], object] | None = None) -> T:
-    """Run steps to their end and return what they return."""
+    """Run all steps and return their result; ``on_progress`` is called after each step.
+
+    Examples
+    --------
+    >>> def work():
+    ...     yield Progress("mesh", 0.5)
+    ...     return "result"
+    >>> finish(work(), lambda progress: print(progress.label))
+    Filling the volume
+    'result'
+    """
     while True:
         try:
             progress = next(steps)
@@ -88,7 +102,7 @@ def finish(steps: Generator[Step, None, T], on_progress: Callable[[Step], object
 
 
 def told(work: Generator[Step, None, T], progress: Callable[[Step], Progress]) -> Steps[T]:
-    """Run work to its end, telling each of its steps as ``progress`` puts it."""
+    """The same work, with each of its steps translated by ``progress``."""
     while True:
         try:
             step = next(work)
@@ -99,18 +113,21 @@ def told(work: Generator[Step, None, T], progress: Callable[[Step], Progress]) -
 
 
 def staged(stage: str, work: Generator[float, None, T], share: tuple[int, int] = (0, 1)) -> Steps[T]:
-    """Name the progress of a piece of work, which is the part ``share`` = (number, of so many) of its stage."""
+    """Turn the fractions that ``work`` yields into progress of a stage.
+
+    ``share`` = (index, count) says that the work is one of ``count`` equal pieces of the stage.
+    """
     return told(work, lambda done: Progress(stage, (share[0] + done) / share[1]))
 
 
 def numbered(steps: Steps[T], fit: int, fits: int) -> Steps[T]:
-    """The same steps as those of fits from number ``fit`` on, of so many in all."""
+    """The same steps, with their fits numbered from ``fit`` on, out of ``fits`` in all."""
     return told(steps, lambda progress: progress._replace(fit=min(fit + progress.fit, fits), fits=fits))
 
 
 @contextmanager
 def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the seconds of what is done meanwhile to those of the stage's name."""
+    """Context manager that adds the time spent in its block to ``seconds[stage]``."""
     started = clock.perf_counter()
     yield
     seconds[stage] = seconds.get(stage, 0.0) + clock.perf_counter() - started

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Independent pieces of work on all cores at once: numpy and scipy let go of the interpreter while they compute."""
+"""Independent pieces of work in threads: numpy and scipy release the GIL while they compute."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Beyond this the interpreter's lock and the memory's bandwidth leave nothing to gain.
+# Beyond four threads, the GIL and the memory bandwidth leave nothing to gain.
 _MOST_THREADS = 4
 
 
 def thread_count() -> int:
-    """How many pieces of work run at once: the cores that this process may use, at most four."""
+    """Number of pieces of work that run at once: the cores available to this process, at most four."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(cores, _MOST_THREADS)
 
 
 @contextmanager
 def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
-    """Begin ``work`` in a thread of its own, to go on with something else; after an error it is not waited for."""
+    """Context manager that runs ``work`` in another thread during its block, and gives its future.
+
+    Leaving the block waits for the work, unless it is left by an exception.
+    """
     pool = ThreadPoolExecutor(1)
     try:
         yield pool.submit(work)
@@ -38,19 +41,25 @@ def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
 
 
 def batches(items: Sequence[Item], most: int) -> list[Sequence[Item]]:
-    """Items a few at a time, ``most`` at most, but no fewer batches than threads."""
+    """Items in batches of at most ``most``, and small enough that every thread gets one."""
     size = max(1, min(most, -(-len(items) // thread_count())))
     return [items[start : start + size] for start in range(0, len(items), size)]
 
 
 def in_threads(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """The results of ``work`` for each item, in the order of the items; only a few are begun ahead of their turn.
+    """Yield the results of ``work`` for all items, in their order; only a few are started ahead of their turn.
 
-    Dropping the iterator ends the work after the pieces that have begun. What a piece raises is raised in its turn.
+    Dropping the iterator finishes the pieces that have started and drops the others. An exception of a piece is raised
+    when its turn comes.
+
+    Examples
+    --------
+    >>> list(in_threads(abs, [-1, 2, -3]))
+    [1, 2, 3]
     """
     threads, remaining = thread_count(), iter(items)
     first = list(islice(remaining, 2))
-    if len(first) < 2 or threads == 1:  # a thread would cost time and gain none
+    if len(first) < 2 or threads == 1:  # threads would only cost time
         yield from map(work, chain(first, remaining))
         return
     with ThreadPoolExecutor(threads) as pool:

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations to positions, positions to rotations: a few shapes of one surface, over and over until they have settled.
+"""Local/global (ARAP) iterations that solve several frames of one surface at once.
 
-Arrays of vertices and triangles are stored by coordinate and shape, (3, q, n), so that every operation runs along
-memory, and over all shapes at once.
+The local step fits a rotation to each triangle, the global step fits positions to the rotations (Sorkine & Alexa 2007,
+"As-rigid-as-possible surface modeling"); one of each is a sweep. Arrays are component-major, (3, q, n) for q shapes,
+so that inner loops are contiguous and cover all shapes.
 """
 
 from __future__ import annotations
@@ -21,35 +22,36 @@ from ..numerics.chebyshev import ChebyshevIteration
 from .system import MovingSurface
 from .tangents import closest_tangents, stretched
 
-# Fixed weights: shapes have not settled fully, and what adaptive weights make of them jumps from one time to the next.
+# Chebyshev weights are fixed in advance: the sweeps end before full convergence, and with adaptive weights what they
+# reach would jump from one time to the next. With these, 13 sweeps do the work of 30 over-relaxed ones
+# (docs/science/method.md).
 _RADIUS = 0.95
 _RELAXATION = 1.3
-_SETTLED = 1e-10  # cube units
-_LARGEST_VOLUME_STEP = 0.1
-_LAST_VOLUME_STEPS = 12
-_VOLUME_TOLERANCE = 1e-12
-# Arrays of so many triangles, a dozen at a time, fit into the cache of one core.
-_TRIANGLES_IN_CACHE = 30_000
+_SETTLED = 1e-10  # cube units; smaller changes are mostly rounding
+_LARGEST_VOLUME_STEP = 0.1  # of the wanted volume: the range in which its linear model is good enough
+_LAST_VOLUME_STEPS = 12  # a cap; a few steps usually suffice
+_VOLUME_TOLERANCE = 1e-12  # relative; rounding
+_TRIANGLES_IN_CACHE = 30_000  # a dozen arrays of this many triangles fit into the cache of one core
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What a surface should look like at one time.
+    """What one shape of a surface should be like.
 
     Parameters
     ----------
     start : (n, 3)
-        Positions to start at; vertices that rest stay there.
+        Initial positions, cube units; still vertices stay there.
     tangents : (3, 2, m)
-        Of the moving triangles, for the first fit.
+        Tangent pairs of the moving triangles for the first global step.
     stretch : (m, 2, 2)
-        Of the moving triangles.
+        In-plane stretches of the moving triangles.
     anchors : (n, 3)
-        Where vertices are drawn to.
+        Anchors of the vertices.
     lengths : (s,)
-        Of the moving springs.
+        Lengths of the moving springs.
     volumes : (components,)
-        Zero where a component is not closed.
+        Enclosed volumes; 0 for components that are not closed.
     """
 
     start: Floats
@@ -61,10 +63,10 @@ class Wanted:
 
 
 class _Operator(NamedTuple):
-    """The gradient operator of a few shapes, multiplied by their stretches.
+    """The gradient operator of several shapes, multiplied by their stretches.
 
-    ``gradient`` takes a coordinate of all used vertices, shape by shape, to its derivatives, by shape, direction and
-    triangle; ``spread`` is its transpose.
+    ``gradient`` takes one coordinate of all used vertices, ordered by shape, to derivatives ordered by shape, direction
+    and triangle; ``spread`` is its transpose.
     """
 
     shapes: slice
@@ -73,10 +75,10 @@ class _Operator(NamedTuple):
 
     @classmethod
     def of(cls, surface: MovingSurface, shapes: slice, stretch: Floats) -> _Operator:
-        """Of a surface and the stretches (q, m, 2, 2) of the shapes."""
-        # One by one: sums of products over several shapes would be rounded by how many there are.
+        """The operator for shapes with the stretches (q, m, 2, 2)."""
+        # Shape by shape: einsum over several would round differently depending on their number.
         values = np.stack([np.einsum("mcb,mbd->dcm", surface.hats, part).transpose(0, 2, 1) for part in stretch])
-        # The pattern is that of one shape, again and again.
+        # Block diagonal: the sparsity pattern of one shape, repeated.
         one = surface.gradient
         columns = one.indices + np.arange(len(stretch), dtype=one.indices.dtype)[:, None] * one.shape[1]
         starts = np.arange(0, values.size + 1, 3, dtype=one.indices.dtype)
@@ -86,19 +88,21 @@ class _Operator(NamedTuple):
 
 
 class Sweeps:
-    """The sweeps of a few shapes, q in number; the result of each is that of its own sweeps.
+    """The sweeps of q shapes at once; the result of each shape does not depend on the others.
 
     Parameters
     ----------
     surface : MovingSurface
+        The factored system.
     wanted : sequence of Wanted
+        One for each shape.
     """
 
     def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted]) -> None:
         self._surface = surface
         self._wanted = wanted
         self._moving = slice(0, len(surface.moving))
-        # The moving vertices, then those beside them.
+        # The moving vertices first, then the still ones next to them.
         self._positions = np.stack([shape.start[surface.used].T for shape in wanted], axis=1)
         self._anchors = np.stack([shape.anchors[surface.moving].T for shape in wanted], axis=1)
         self._stretch = np.stack([shape.stretch for shape in wanted])
@@ -107,7 +111,7 @@ class Sweeps:
         self._volume_direction: Floats | None = None
 
     def settled(self, sweeps: int) -> list[Floats]:
-        """(n, 3) positions of each shape after so many sweeps."""
+        """(n, 3) positions of each shape, cube units, after the given number of sweeps."""
         settled = [shape.start.copy() for shape in self._wanted]
         if len(self._surface.moving):
             self._sweep(sweeps)
@@ -121,10 +125,10 @@ class Sweeps:
         self._move(self._corrected(True))
         for sweep in range(1, sweeps):
             present, refitted = self._moved.copy(), self._refitted()
-            # The first half gets by without volumes.
+            # Volumes are restored in the second half only: doing it earlier improves no measure.
             if 2 * sweep > sweeps:
                 refitted = self._with_volumes(refitted)
-            # Of a shape that has settled only rounding would be amplified.
+            # Acceleration would only amplify the rounding of a shape that has converged.
             going &= np.abs(refitted - present).max(axis=(0, 2)) > _SETTLED
             if not going.any():
                 break
@@ -142,7 +146,7 @@ class Sweeps:
 
     @cached_property
     def _operators(self) -> list[_Operator]:
-        """Gradients multiplied by the wanted stretches, for as many shapes at once as the processor's cache holds."""
+        """Gradient operators with the wanted stretches, each for as many shapes as the processor's cache can hold."""
         surface, shapes = self._surface, len(self._wanted)
         size = max(1, _TRIANGLES_IN_CACHE // max(1, len(surface.rows)))
         return [
@@ -158,14 +162,14 @@ class Sweeps:
         )
 
     def _closest_tangents(self, operator: _Operator, lengths: Floats | float = 1.0) -> Floats:
-        """(3, 2, q, m) of the operator's shapes, in memory by coordinate, shape and direction."""
+        """(3, 2, q, m) the local step for the operator's shapes; in memory, the shape comes before the direction."""
         positions = self._positions[:, operator.shapes]
         rows = [operator.gradient @ coordinate.ravel() for coordinate in positions]
         gradients = np.stack(rows).reshape(3, positions.shape[1], 2, len(self._surface.rows))
         return closest_tangents(gradients.transpose(0, 2, 1, 3), lengths)
 
     def _refitted(self) -> Floats:
-        """Positions (3, q, k) fitted to the rotations that the present ones ask for."""
+        """(3, q, k) positions after one sweep: rotations are fitted to the present positions, positions to them."""
         load = self._constant_load.copy()
         for operator in self._operators:
             tangents = self._closest_tangents(operator, self._surface.weights).transpose(0, 2, 1, 3)
@@ -177,9 +181,10 @@ class Sweeps:
         return self._surface.solve(load)
 
     def _corrected(self, first: bool) -> Floats:
-        """Positions (3, q, k) fitted at first to the wanted tangents, later to the closest, and solved for the change.
+        """(3, q, k) positions after a global step that is solved for the change from the present positions.
 
-        Where the present positions are right, needles and tiny parts do not spoil them.
+        The first such step uses the wanted tangents, the last one the closest. Solving for the change keeps rounding in
+        needles and tiny parts from spoiling positions that are right already.
         """
         surface = self._surface
         load = surface.anchor_weights * (self._anchors - self._moved)
@@ -199,13 +204,13 @@ class Sweeps:
         return np.asarray(self._moved + surface.solve(load))
 
     def _wanted_spans(self) -> Floats:
-        """(3, q, s) the springs as long as they should be, in their present directions."""
+        """(3, q, s) the springs' vectors with the wanted lengths, in their present directions."""
         spans = _applied(self._surface.spans, self._positions)
         present = np.sqrt((spans**2).sum(axis=0))
         return np.asarray(spans * np.where(present > 1e-12, self._lengths / np.maximum(present, 1e-12), 0.0))
 
     def _with_volumes(self, moved: Floats) -> Floats:
-        """Positions (3, q, k) moved on until, to first order, every closed component has its volume."""
+        """(3, q, k) positions ``moved``, corrected so that every closed component has its volume to first order."""
         volumes = self._surface.volumes
         if volumes.empty:
             return moved
@@ -220,18 +225,18 @@ class Sweeps:
         return result
 
     def _direction(self, slopes: Floats) -> Floats:
-        """(3, q, k) K^-1 grad V where it is first asked for; shapes change too little for it to be worth renewing."""
+        """(3, q, k) K⁻¹ ∇V, computed at the first call only: shapes change too little afterward to matter."""
         if self._volume_direction is None:
             self._volume_direction = self._surface.solve(slopes)
         return self._volume_direction
 
     def _limited(self, missing: Floats, shape: int) -> Floats:
-        # Volume is cubic along a step; a shape that is still far off must not be blown up by the linear model.
+        # The volume is cubic in the step: far from the wanted volume, the linear model would overshoot.
         largest = _LARGEST_VOLUME_STEP * np.abs(self._wanted[shape].volumes)
         return np.clip(missing, -largest, largest)
 
     def _restore_volumes(self) -> None:
-        """Steps along K^-1 grad V until every closed component of every shape has its volume."""
+        """Steps along K⁻¹ ∇V until every closed component of every shape has its volume, up to rounding."""
         volumes = self._surface.volumes
         if volumes.empty:
             return
@@ -252,5 +257,5 @@ class Sweeps:
 
 
 def _applied(matrix: csr_array | csc_array, coordinates: Floats) -> Floats:
-    """(3, q, r) a matrix (r, c) applied to the rows of (3, q, c)."""
+    """(3, q, r) a matrix (r, c) applied to each row of an array (3, q, c)."""
     return np.stack([[matrix @ row for row in shapes] for shapes in coordinates])

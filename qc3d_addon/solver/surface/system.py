@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The system of a surface's moving vertices.
+"""The linear system of a surface's moving vertices.
 
-The part that moves is small on most shape keys, so vertices that rest, and triangles among them, are left out.
+On most shape keys only a small part of the mesh moves, so still vertices, and triangles with still vertices only, are
+left out of the system.
 """
 
 from __future__ import annotations
@@ -23,28 +24,35 @@ from .volumes import MovingVolumes
 
 
 class MovingSurface:
-    """The system that a surface's moving vertices solve; it is factored once for all times.
+    """The linear system of a surface's moving vertices, factored once for all times.
+
+    The matrix is the weighted Laplacian of the triangles, plus the springs, plus the diagonal anchor weights.
 
     Parameters
     ----------
     deformation : TriangleDeformation
+        All usable triangles of the surface.
     springs : (s, 2) int64
-        Edges that keep their length.
+        Edges that keep their interpolated length.
     closed : ClosedComponents
+        Components whose volume is kept.
     free : (n,) bool
-        Vertices that move.
+        Whether each vertex moves; the others are still.
     points : (n, 3)
-        Where the vertices are, for the order of elimination.
+        Positions of the vertices, for the order of elimination.
     anchor_weights : (n,)
+        How strongly each vertex is drawn to its anchor.
 
     Attributes
     ----------
     rows : (m,) int64
-        The triangles of the deformation that have a moving corner.
+        Indices, in the deformation, of the moving triangles: those with a moving corner.
     springs : (s,) int64
-        The springs that have a moving end.
-    moving, used : (k,), (l,) int64
-        The vertices that move, and these with those that rest beside them.
+        Indices of the moving springs: those with a moving end.
+    moving : (k,) int64
+        The moving vertices, in the order of elimination.
+    used : (l,) int64
+        The moving vertices, followed by the still vertices next to them.
     """
 
     def __init__(
@@ -95,6 +103,9 @@ class MovingSurface:
         self._factored = factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
 
     def solve(self, loads: Floats) -> Floats:
-        """(..., k) solutions for loads (..., k) on the moving vertices: the factors pass through memory once."""
+        """(..., k) solutions for loads (..., k) on the moving vertices.
+
+        Solving for many loads in one call is faster: the factors are read from memory once.
+        """
         flat = loads.reshape(-1, loads.shape[-1])
         return np.asarray(self._factored.solve(flat.T).T.reshape(loads.shape))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The enclosed volumes of a surface of which only some vertices move, and their gradients."""
+"""Enclosed volumes of a surface with moving and still vertices, and their gradients."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from ..triangles.topology import distinct
 
 
 class MovingVolumes:
-    """The volumes of closed components of which some vertices move.
+    """Volumes of the closed components that have moving vertices.
 
-    Only triangles with a moving corner are looked at again and again; what the others enclose is counted once.
+    Each volume is split into the part of the moving triangles, which is computed again and again, and the part of the
+    still triangles, which is computed once.
 
     Parameters
     ----------
     closed : ClosedComponents
     moving : (k,) int64
-        The vertices that move.
+        The moving vertices.
     used : (l,) int64
-        The vertices whose positions are given: the moving ones first, then at least all that share a triangle with
-        them.
+        The vertices whose positions will be given: first the moving ones, then at least all that share a triangle with
+        one of them.
     """
 
     def __init__(self, closed: ClosedComponents, moving: Ints, used: Ints) -> None:
@@ -41,14 +42,15 @@ class MovingVolumes:
         number = np.full(count, -1, dtype=np.int64)
         number[used] = np.arange(len(used))
         self._corners: Ints = np.ascontiguousarray(number[faces].T)
-        # Each component is seen from one of its corners, one that rests if there is one: what rests looks the same.
+        # The apex of a component's cones is one of its vertices, a still one if there is one, so that the part of the
+        # still triangles is constant.
         corners = distinct(faces.ravel())
         corners = corners[np.lexsort((moves[corners], closed.labels[corners]))]
         labels, first = np.unique(closed.labels[corners], return_index=True)
         self._components = int(closed.labels.max(initial=-1)) + 1
         self._views = np.zeros(self._components, dtype=np.int64)
         self._views[labels] = corners[first]
-        # The corners of each triangle, and where it is seen from.
+        # The three corners of each triangle and the apex of its cone.
         self._looked_at = np.concatenate([self._corners, number[self._views[self._label_of_face]][None]])
         flat = self._corners.ravel()
         free = np.flatnonzero(flat < len(moving))
@@ -57,20 +59,26 @@ class MovingVolumes:
 
     @property
     def empty(self) -> bool:
-        """Whether no closed component moves."""
+        """Whether no closed component has moving vertices."""
         return not self._corners.size
 
     def resting(self, positions: Floats) -> Floats:
-        """(components,) what triangles without a moving corner enclose; positions (n, 3) of all vertices."""
+        """(components,) volume under the still triangles, for positions (n, 3) of all vertices."""
         return volumes_seen_from(positions[self._views], positions, self._resting, self._labels)
 
     def with_slope(self, positions: Floats) -> tuple[Floats, Floats]:
-        """(components,) what triangles with a moving corner enclose, and (3, k) how volumes change with what moves.
+        """Volumes under the moving triangles, and their gradients.
 
         Parameters
         ----------
         positions : (3, l)
-            Of the used vertices.
+            Positions of the used vertices.
+
+        Returns
+        -------
+        volumes : (components,)
+        slope : (3, k)
+            Derivative of the volume of each moving vertex's component with respect to the vertex's coordinates.
         """
         seen = np.empty((3, *self._looked_at.shape))
         for axis in range(3):
@@ -82,11 +90,11 @@ class MovingVolumes:
         return volumes, np.stack([self._incidence @ normal for normal in normals]) / 6.0
 
     def changes(self, slope: Floats, moves: Floats) -> Floats:
-        """(components,) what volumes gain, to first order, where vertices move by ``moves`` (3, k)."""
+        """(components,) first-order change of the volumes if the moving vertices are displaced by ``moves`` (3, k)."""
         return sums_by_label(self._label_of_vertex, (slope * moves).sum(axis=0), self._components)
 
     def stepped(self, moved: Floats, direction: Floats, slope: Floats, missing: Floats) -> Floats:
-        """Positions (3, k) moved along ``direction`` so far that, to first order, volumes gain what is missing."""
+        """(3, k) positions moved along ``direction`` so that, to first order, volumes grow by ``missing``."""
         gain = self.changes(slope, direction)
         grows = gain > 0.0
         length = np.where(grows, missing / np.where(grows, gain, 1.0), 0.0)

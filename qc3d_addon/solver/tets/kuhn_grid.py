@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The unit cube in small cubes, each cut into six tetrahedra: a mesh that needs no shape, and no storing."""
+"""Regular tetrahedral grids of the unit cube, which depend on nothing but their resolution."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ import numpy as np
 
 from .mesh import TetMesh
 
-_JITTER = 0.15  # of a cell
+_JITTER = 0.15  # of a cell: enough to break all symmetry, too little to invert a tetrahedron
 
 
 def kuhn_grid(cells: int) -> TetMesh:
-    """The unit cube in ``cells``^3 small cubes, each cut along its diagonal (Freudenthal, Kuhn)."""
+    """The unit cube in ``cells``³ small cubes, each cut into six tetrahedra around its diagonal (Freudenthal, Kuhn).
+
+    Examples
+    --------
+    >>> mesh = kuhn_grid(2)
+    >>> len(mesh.points), len(mesh.tets)
+    (27, 48)
+    """
     ticks = np.arange(cells + 1)
     grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
     strides = np.array([(cells + 1) ** 2, cells + 1, 1])
@@ -29,10 +36,12 @@ def kuhn_grid(cells: int) -> TetMesh:
 
 
 def uneven_grid(cells: int) -> TetMesh:
-    """The same with the vertices inside moved a little, the same way everywhere: it has no symmetry, so its modes are
-    unique."""
+    """A ``kuhn_grid`` whose inner vertices are shifted slightly, and reproducibly.
+
+    It has no symmetry, so all eigenvalues of its Laplacian are simple and its modes are unique.
+    """
     mesh = kuhn_grid(cells)
-    # Weyl's sequence of whole numbers, spread over -1/2 .. 1/2.
+    # A Weyl sequence of integers, scaled to -1/2 .. 1/2.
     places = np.arange(mesh.points.size, dtype=np.uint64) * np.uint64(2654435761) % np.uint64(1 << 32)
     shift = _JITTER / cells * (places.astype(np.float64) / (1 << 32) - 0.5).reshape(-1, 3)
     return TetMesh(mesh.points + np.where(mesh.on_cube_face, 0.0, 2.0 * shift), mesh.tets)

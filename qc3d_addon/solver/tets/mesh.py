@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tetrahedral meshes of the unit cube: measures, gradients and topology."""
+"""Tetrahedral meshes of the unit cube: volumes, gradients, adjacency."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ..errors import MeshingError
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Vertices of the face opposite to each corner, ordered so that the normal points out of a positive tetrahedron.
+# Corners of the face opposite each corner, ordered so that its normal points out of a positively oriented tetrahedron.
 OPPOSITE_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 @dataclass(frozen=True, eq=False)
 class TetMesh:
-    """A conforming tetrahedral mesh, every tetrahedron positively oriented.
+    """A conforming tetrahedral mesh with positive orientation.
 
     Parameters
     ----------
     points : (N, 3) float64
         Vertex positions.
     tets : (M, 4) int64
-        Corner indices; det(p1 - p0, p2 - p0, p3 - p0) > 0 for each row.
+        Vertex indices of the tetrahedra; det(p1 - p0, p2 - p0, p3 - p0) > 0 for each row.
     """
 
     points: Floats
@@ -37,28 +37,28 @@ class TetMesh:
 
     @cached_property
     def edge_matrices(self) -> Floats:
-        """(M, 3, 3): columns p1 - p0, p2 - p0, p3 - p0."""
+        """(M, 3, 3) matrices with columns p1 - p0, p2 - p0, p3 - p0."""
         return edge_matrices(self.points, self.tets)
 
     @cached_property
     def volumes(self) -> Floats:
-        """(M,): signed volumes, cube units."""
+        """(M,) signed volumes, as fractions of the cube."""
         return np.asarray(np.linalg.det(self.edge_matrices) / 6.0)
 
     @cached_property
     def gradients(self) -> Floats:
-        """(M, 4, 3): constant gradients of the four hat functions on each tetrahedron."""
+        """(M, 4, 3) gradients of the four hat functions of each tetrahedron."""
         inner = np.linalg.inv(self.edge_matrices)
         return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
 
     @cached_property
     def centroids(self) -> Floats:
-        """(M, 3): centroids of the tetrahedra."""
+        """(M, 3) centroids of the tetrahedra."""
         return np.asarray(self.points[self.tets].mean(axis=1))
 
     @cached_property
     def neighbours(self) -> Ints:
-        """(M, 4): the tetrahedron across the face opposite to each corner, -1 on the boundary.
+        """(M, 4) neighbor across the face opposite each corner, -1 on the boundary.
 
         Raises
         ------
@@ -78,26 +78,26 @@ class TetMesh:
 
     @cached_property
     def boundary_faces(self) -> Ints:
-        """(F, 3): triangles on the boundary, normals pointing out."""
+        """(F, 3) boundary triangles, with normals pointing out."""
         tet, corner = np.nonzero(self.neighbours < 0)
         return np.asarray(self.tets[tet[:, None], OPPOSITE_FACES[corner]])
 
     @cached_property
     def on_cube_face(self) -> Bools:
-        """(N, 3): whether coordinate c of a vertex is exactly 0 or 1, that is, held by the sliding boundary."""
+        """(N, 3) whether each coordinate of a vertex is exactly 0 or 1, that is, fixed by the sliding boundary."""
         return np.asarray((self.points == 0.0) | (self.points == 1.0))
 
     @cached_property
     def gradient_operator(self) -> csr_array:
-        """(3M, N): takes a coordinate of a map (N,) to its derivatives along x on all tetrahedra, then y, then z."""
-        # The types of this module are wanted where scipy must not be loaded yet.
+        """(3M, N) sparse: takes vertex values to their derivatives along x on all tetrahedra, then along y, then z."""
+        # Imported here because this module's types are used where scipy must not be loaded yet.
         from ..numerics.assembly import gradient_operator
 
         return gradient_operator(self.tets, self.gradients, len(self.points))
 
     @cached_property
     def incidence(self) -> csr_array:
-        """(N, M): 1 where a vertex is a corner of a tetrahedron."""
+        """(N, M) sparse: 1 where a vertex is a corner of a tetrahedron."""
         from scipy.sparse import coo_array
 
         owners = np.repeat(np.arange(len(self.tets)), 4)
@@ -105,12 +105,15 @@ class TetMesh:
         return coo_array((np.ones(len(owners)), (self.tets.ravel(), owners)), shape=shape).tocsr()
 
     def jacobians(self, values: Floats) -> Floats:
-        """(M, 3, 3) Jacobians, stored by component, of the map that sends ``points`` to ``values`` (N, 3)."""
+        """(M, 3, 3) Jacobians of the map that sends ``points`` to ``values`` (N, 3); component-major."""
         rows = [self.gradient_operator @ coordinate for coordinate in np.ascontiguousarray(values.T)]
         return np.asarray(np.moveaxis(np.stack(rows).reshape(3, 3, -1), -1, 0))
 
     def divergence(self, fields: Floats) -> Floats:
-        """(N, 3): what fields (M, 3, 3) of row vectors, weighted, give to the vertices; ``jacobians`` transposed."""
+        """(N, 3) the transpose of ``jacobians``, applied to fields of matrices (M, 3, 3).
+
+        It is minus the weak divergence of the rows if the fields are multiplied by the volumes.
+        """
         rows = np.moveaxis(fields, 0, -1).reshape(3, -1)
         return np.stack([self.gradient_operator.T @ row for row in rows], axis=1)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Find points in a tetrahedral mesh: which tetrahedron holds each of them, and with what barycentric weights."""
+"""Point location in tetrahedral meshes: the tetrahedron that contains each point, and its barycentric weights."""
 
 from __future__ import annotations
 
@@ -12,39 +12,44 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import MeshingError
 from .mesh import TetMesh
 
-ROUNDING = 1e-12  # a weight this far below zero is still "inside": the point lies on a face
-TOLERANCE = 1e-9  # the most negative weight ever returned
-_CANDIDATES = 64
+ROUNDING = 1e-12  # a weight this little below zero still counts as inside: the point lies on a face
+TOLERANCE = 1e-9  # no weight below minus this is ever returned
+_CANDIDATES = 64  # nearest centroids tried for points that the walk does not find; nearly always enough
 
 
 def locate(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats]:
-    """Locate points by a walk from the nearest centroid across the face behind which each point lies.
+    """Find the tetrahedron that contains each point.
 
-    The walk is the visibility walk of Devillers, Pion & Teillaud (2002), for all points at once. On meshes that are not
-    Delaunay it may go round in circles; such points are looked for among the nearest tetrahedra, then in all of them.
+    The visibility walk of Devillers, Pion & Teillaud, for all points at once: start at the nearest centroid and keep
+    crossing a face that separates the tetrahedron from the point. In meshes that are not Delaunay the walk may cycle;
+    such points are searched among the nearest tetrahedra, then among all.
 
     Parameters
     ----------
     mesh : TetMesh
-        A mesh whose union is convex (the cube).
+        A mesh of a convex domain, such as the cube.
     points : (n, 3) float64
-        Where to look, in the mesh's units.
+        Points in the mesh's units.
 
     Returns
     -------
     tets : (n,) int64
-        The tetrahedron that holds each point.
+        Index of the tetrahedron that contains each point.
     weights : (n, 4) float64
-        Barycentric weights; they sum to 1 and none is below -1e-9.
+        Barycentric weights; they sum to 1, and none is below -1e-9.
 
     Raises
     ------
     MeshingError
         If a point is not finite or lies outside the mesh.
+
+    References
+    ----------
+    Devillers, Pion & Teillaud, "Walking in a triangulation", 2002.
     """
     points = np.asarray(points, dtype=np.float64)
     lowest, highest = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    # Not "outside the box": the comparison must also catch what is not a number.
+    # Tested as "inside", since a comparison with NaN is false.
     _require_inside(points, ((points >= lowest - TOLERANCE) & (points <= highest + TOLERANCE)).all(axis=1))
     tree = cKDTree(mesh.centroids)
     tets = np.asarray(tree.query(points)[1], dtype=np.int64)
@@ -58,12 +63,19 @@ def locate(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats]:
 
 
 def interpolation_matrix(mesh: TetMesh, points: Floats) -> csr_array:
-    """The sparse matrix B (n, N) that interpolates from the mesh's vertices to ``points``: B @ mesh.points = points.
+    """Sparse matrix B that interpolates vertex values at ``points``; B @ mesh.points = points.
 
     Parameters
     ----------
     mesh : TetMesh
+        N vertices; a mesh of a convex domain.
     points : (n, 3) float64
+        Points in the mesh's units.
+
+    Returns
+    -------
+    (n, N) sparse
+        Four barycentric weights in each row.
 
     Raises
     ------
@@ -76,9 +88,10 @@ def interpolation_matrix(mesh: TetMesh, points: Floats) -> csr_array:
 
 
 def barycentric(mesh: TetMesh, tets: Ints, points: Floats) -> Floats:
-    """(..., 4) weights of ``points`` (..., 3) with respect to the tetrahedra ``tets`` (...); negative outside.
+    """(..., 4) barycentric weights of points (..., 3) in the tetrahedra with indices ``tets`` (...).
 
-    They sum to 1, and are measured from the first corner, so that weights @ corners gives the point back to rounding.
+    They sum to 1; some are negative where a point lies outside. They are computed relative to the first corner, so that
+    weights @ corners reproduces the point to rounding.
     """
     offsets = points - mesh.points[mesh.tets[tets, 0]]
     others = np.einsum("...ka,...a->...k", mesh.gradients[tets, 1:], offsets)
@@ -95,13 +108,13 @@ def _require_inside(points: Floats, inside: Bools) -> None:
 
 
 def _walk(mesh: TetMesh, points: Floats, tets: Ints) -> Ints:
-    """Move ``tets`` (n,), in place, to where the points are; return the points that have not arrived."""
+    """Walk from ``tets`` (n,), in place, to the points; return the indices of points that were not reached."""
     active = np.arange(len(points))
     for _ in range(20 + 4 * round(len(mesh.tets) ** (1 / 3))):
         if not active.size:
             break
         weights = barycentric(mesh, tets[active], points[active])
-        # On the boundary there is nothing behind a face: go round by another face that the point is behind.
+        # There is nothing behind a boundary face: take another face that the point is behind.
         weights[(mesh.neighbours[tets[active]] < 0) & (weights < -ROUNDING)] = 0.0
         corner = weights.argmin(axis=1)
         behind = weights.min(axis=1) < -ROUNDING
@@ -112,7 +125,7 @@ def _walk(mesh: TetMesh, points: Floats, tets: Ints) -> Ints:
 
 
 def _choose_among_nearest(mesh: TetMesh, points: Floats, tets: Ints, lost: Ints, tree: cKDTree) -> Bools:
-    """For the lost points take the best of the nearest tetrahedra; return which of them that settles."""
+    """Give each lost point the best of the nearest tetrahedra; return which of them are thereby found."""
     if not lost.size:
         return np.empty(0, dtype=bool)
     nearest = np.asarray(tree.query(points[lost], k=min(_CANDIDATES, len(mesh.tets)))[1]).reshape(len(lost), -1)
@@ -125,6 +138,6 @@ def _choose_among_nearest(mesh: TetMesh, points: Floats, tets: Ints, lost: Ints,
 
 
 def _search_everywhere(mesh: TetMesh, point: Floats) -> int:
-    """The tetrahedron of the whole mesh with the largest smallest weight."""
+    """The tetrahedron of the whole mesh whose smallest weight for the point is largest."""
     smallest = barycentric(mesh, np.arange(len(mesh.tets)), np.broadcast_to(point, (len(mesh.tets), 3))).min(axis=1)
     return int(smallest.argmax())

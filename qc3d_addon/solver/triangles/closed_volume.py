@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The volumes that the closed components of a surface enclose."""
+"""Volumes enclosed by the closed components of a surface."""
 
 from __future__ import annotations
 
@@ -12,28 +12,36 @@ from .topology import closed_faces
 
 
 class ClosedComponents:
-    """Components of a triangle mesh in which every edge has exactly two triangles.
+    """The closed components of a triangle mesh: every edge has exactly two triangles, consistently oriented.
 
     Parameters
     ----------
     faces : (m, 3) int64
+        All triangles of the mesh.
     labels : (n,) int64
-        Component of every vertex; volumes are listed by label, zero for components that are not closed.
+        Component of each vertex: 0, 1, 2, ...
+
+    Examples
+    --------
+    >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 6.0]])
+    >>> ClosedComponents(tetrahedron, np.zeros(4, dtype=np.int64)).volumes(corners)
+    array([1.])
     """
 
     def __init__(self, faces: Ints, labels: Ints) -> None:
         self.faces = faces[closed_faces(faces, labels)]
         self.labels = labels
-        # Seen from a vertex of its own, a tiny component far away has its volume to rounding.
+        # Measured from one of its own vertices, a tiny component far from the origin has an accurate volume.
         self._views: Ints = np.unique(labels, return_index=True)[1].astype(np.int64)
 
     def volumes(self, positions: Floats) -> Floats:
-        """(components,) signed enclosed volumes of positions (n, 3)."""
+        """(components,) signed enclosed volumes for positions (n, 3), in cubed units; 0 for open components."""
         return volumes_seen_from(positions[self._views], positions, self.faces, self.labels)
 
 
 def volumes_seen_from(views: Floats, positions: Floats, faces: Ints, labels: Ints) -> Floats:
-    """(components,) signed volumes of the cones over triangles (m, 3), each seen from its component's view (k, 3)."""
+    """(k,) signed volumes of the cones over triangles (m, 3), by component; the apexes are ``views`` (k, 3)."""
     label = labels[faces[:, 0]]
     first, second, third = (positions[faces[:, corner]] - views[label] for corner in range(3))
     shares = np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0

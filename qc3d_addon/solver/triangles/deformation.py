@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangles that go from one key to the other by their own rotation and stretch.
+"""Rotation and in-plane stretch of each triangle from the first key to the second.
 
-Every triangle has a deformation gradient from the first key to the second, the unit normals being the third
-direction (Sumner & Popovic 2004). Its rotation and in-plane stretch are interpolated, and positions are fitted to
-them in the least-squares sense (Xu et al. 2005), then rotations to positions and so on (Sorkine & Alexa 2007).
+Each triangle has a deformation gradient between the keys, completed by its unit normals (Sumner & Popovic 2004,
+"Deformation transfer for triangle meshes"). The surface pass interpolates its rotation and stretch and fits positions
+to them by least squares (Xu et al. 2005, "Poisson shape interpolation"), then alternates between fitting rotations and
+positions (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling").
 """
 
 from __future__ import annotations
@@ -18,35 +19,37 @@ from ..numerics.rotations import rotation_vectors
 from ..numerics.symmetric_matrices import Stretch
 from .geometry import face_normals, hat_gradients, planar_jacobians, tangent_bases
 
-# Triangles thinner than this part of the largest area have no usable directions in floating point; nor have those
-# whose area may come from rounding: this part of their longest edge times the largest coordinate.
+# Below these areas a triangle has no usable directions in floating point: relative to the largest area of the mesh, and
+# relative to the longest edge times the largest coordinate, where the area may be nothing but rounding.
 _THINNEST = 1e-10
 _ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleDeformation:
-    """Rotation and stretch of triangles between two keys, in local tangent bases.
+    """Rotation and in-plane stretch of triangles between two keys, in local tangent bases.
+
+    Build it with ``TriangleDeformation.between``.
 
     Parameters
     ----------
     faces : (m, 3) int64
-        Triangles that have an area in both keys.
+        The usable triangles: those that have an area in both keys.
     weights : (m,)
-        What each counts in a fit: between one each and its area, so that small triangles keep their lengths too.
-        The sum is the area of the surface in the first key.
+        Weights in least-squares fits: proportional to the square root of the area, so that small triangles keep their
+        lengths too. Their sum is the area of the surface in the first key.
     bases : (m, 3, 3)
         Columns: two tangents and the unit normal in the first key.
     gradients : (m, 3, 2)
-        Gradients of the hat functions in the tangent basis of the first key.
+        Gradients of the hat functions, in the tangent basis of the first key.
     stretch : Stretch
-        Symmetric in-plane stretch (m, 2, 2) from the first key to the second.
+        Symmetric in-plane stretches (m, 2, 2) from the first key to the second.
     turns : (m, 3)
-        Rotation vectors in radians, the short way round.
+        Rotation vectors in radians, with angles in [0, pi].
     spins : (m, 2, 2)
-        Rotations in the plane: from the tangents of the first key, carried along, to those of the second.
+        In-plane rotations from the tangents of the first key, carried along by the rotation, to those of the second.
     rows : (m,) int64
-        Which triangles of the mesh these are.
+        Indices of these triangles in the whole mesh.
     """
 
     faces: Ints
@@ -60,7 +63,7 @@ class TriangleDeformation:
 
     @classmethod
     def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
-        """Deformation from ``key0`` (n, 3) to ``key1`` of the triangles of ``faces`` that have an area in both."""
+        """Deformation of the usable triangles of ``faces`` (m, 3) from ``key0`` (n, 3) to ``key1`` (n, 3)."""
         double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
         usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
         faces = faces[usable]
@@ -79,7 +82,7 @@ class TriangleDeformation:
 
 
 def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
-    """(m,) what twice the area of a triangle must exceed: beside the largest, and beside rounding of its corners."""
+    """(m,) bound that twice the area of a usable triangle must exceed; ``double`` (m,) is twice the areas."""
     corners = key[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
@@ -87,7 +90,7 @@ def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
 
 
 def _planar_rotations(planar: Floats) -> Floats:
-    """(m, 2, 2) rotations closest to 2 x 2 matrices."""
+    """(m, 2, 2) rotations closest to 2 x 2 matrices (m, 2, 2)."""
     cosine, sine = planar[:, 0, 0] + planar[:, 1, 1], planar[:, 1, 0] - planar[:, 0, 1]
     angle = np.arctan2(sine, cosine)
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -95,7 +98,7 @@ def _planar_rotations(planar: Floats) -> Floats:
 
 
 def _lifted(bases: Floats, spin: Floats) -> Floats:
-    """(m, 3, 3) bases with the tangents turned in their plane."""
+    """(m, 3, 3) bases whose tangents are turned in their plane by ``spin`` (m, 2, 2)."""
     lifted = bases.copy()
     lifted[:, :, :2] = bases[:, :, :2] @ spin
     return lifted

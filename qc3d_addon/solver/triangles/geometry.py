@@ -11,7 +11,7 @@ from ..numerics.grouped_sums import sums_by_label
 
 
 def cross_product(first: Floats, second: Floats) -> Floats:
-    """(3, ...) cross products of vectors (3, ...), stored by coordinate."""
+    """(3, ...) cross products of component-major vectors (3, ...)."""
     (x, y, z), (u, v, w) = first, second
     product = np.empty((3, *x.shape))
     np.subtract(y * w, z * v, out=product[0])
@@ -21,13 +21,13 @@ def cross_product(first: Floats, second: Floats) -> Floats:
 
 
 def face_normals(positions: Floats, faces: Ints) -> Floats:
-    """(m, 3) normals of the triangles, twice as long as the areas."""
+    """(m, 3) normals of triangles (m, 3); the length of each is twice the triangle's area."""
     first, second, third = (positions[faces[:, corner]] for corner in range(3))
     return np.asarray(np.cross(second - first, third - first))
 
 
 def tangent_bases(positions: Floats, faces: Ints) -> Floats:
-    """(m, 3, 3) orthonormal columns: along the first edge, across it in the plane, and the unit normal."""
+    """(m, 3, 3) orthonormal bases in columns: along the first edge, perpendicular to it in the plane, unit normal."""
     normal = face_normals(positions, faces)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     along = positions[faces[:, 1]] - positions[faces[:, 0]]
@@ -36,7 +36,7 @@ def tangent_bases(positions: Floats, faces: Ints) -> Floats:
 
 
 def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
-    """(m, 3, 2) gradients of the three hat functions of each triangle in its tangent basis."""
+    """(m, 3, 2) gradients of the three hat functions of each triangle, in its tangent basis (m, 3, 3)."""
     edges = np.stack(
         [positions[faces[:, 1]] - positions[faces[:, 0]], positions[faces[:, 2]] - positions[faces[:, 0]]], axis=2
     )
@@ -45,18 +45,32 @@ def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
 
 
 def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: Floats) -> Floats:
-    """(m, 2, 2) in-plane Jacobians from the tangent basis of ``gradients`` to that of ``bases``."""
+    """(m, 2, 2) in-plane Jacobians of the map to ``positions``.
+
+    Parameters
+    ----------
+    positions : (n, 3)
+        Vertices after the map.
+    faces : (m, 3) int64
+    bases : (m, 3, 3)
+        Tangent bases after the map.
+    gradients : (m, 3, 2)
+        Gradients of the hat functions in the tangent bases before the map.
+    """
     corners = np.einsum("mki,mij->mkj", positions[faces], bases[:, :, :2])
     return np.asarray(np.einsum("mki,mkj->mij", corners, gradients))
 
 
 def areas(positions: Floats, faces: Ints) -> Floats:
-    """(m,) areas of the triangles (m, 3) of positions (n, 3), in the square of their unit."""
+    """(m,) areas of triangles (m, 3) with vertices at positions (n, 3), in squared units."""
     return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
 
 
 def vertex_areas(points: Floats, faces: Ints) -> Floats:
-    """(n,) a third of the area of the triangles around each vertex, never below a thousandth of the mean."""
+    """(n,) barycentric vertex areas: a third of the area of the triangles around each vertex.
+
+    At least a thousandth of the mean, so that every vertex has a positive weight; all 1 for a mesh without area.
+    """
     shares = sums_by_label(faces.ravel(), np.repeat(areas(points, faces) / 3.0, 3), len(points))
     mean = float(shares.mean())
     return np.maximum(shares, 1e-3 * mean) if mean > 0.0 else np.ones(len(points))

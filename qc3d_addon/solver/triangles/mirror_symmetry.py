@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mirror image of every vertex."""
+"""Mirror symmetry of a mesh: which vertex is the mirror image of which."""
 
 from __future__ import annotations
 
@@ -12,33 +12,39 @@ from scipy.spatial import cKDTree
 from ..arrays import Floats, Ints
 from ..errors import InputError
 
-TOLERANCE = 1e-4  # of the bounding box's diagonal
+TOLERANCE = 1e-4  # of the bounding-box diagonal: what modeling by hand and saving in single precision leave
 
-_MOST_TOGETHER = 8  # vertices in one place
+_MOST_TOGETHER = 8  # candidates looked at for each vertex; no ordinary mesh has more vertices in one place
 
 
 def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float = TOLERANCE) -> Ints:
-    """The vertex that lies where each vertex's mirror image is.
+    """For each vertex, the vertex that lies at its mirror image.
 
     Parameters
     ----------
     points : (n, 3)
         A shape that is symmetric about the plane where the coordinate ``axis`` is 0.
-    edges : (e, 2)
-        Edges; they tell apart vertices that lie in one place, such as those of closed lips.
+    edges : (e, 2) int64
+        Edges of the mesh; they tell apart vertices that coincide, such as those of closed lips.
     axis : int
         0, 1 or 2.
     tolerance : float
-        How far a partner may be from the mirror image, relative to the bounding box's diagonal.
+        Largest distance between a vertex's mirror image and its partner, relative to the bounding-box diagonal.
 
     Returns
     -------
-    (n,) partners; the partner of a vertex's partner is that vertex itself.
+    (n,) int64
+        Partners; the partner of a vertex's partner is that vertex.
 
     Raises
     ------
     InputError
-        If vertices have no partner, naming how many.
+        If some vertices have no partner; the message says how many.
+
+    Examples
+    --------
+    >>> mirror_partners(np.array([[-1.0, 0, 0], [1.0, 0, 0], [0, 2.0, 0]]), np.array([[0, 2], [1, 2]]))
+    array([1, 0, 2])
     """
     count = len(points)
     reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -64,9 +70,9 @@ def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float
 
 
 def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> None:
-    """Choose among several candidates by the neighbours, whose partners are neighbours of the right one.
+    """Choose among several candidates: the right one is joined by edges to the partners of the vertex's neighbors.
 
-    Only the few vertices that lie in one place with others come here.
+    Only for the few vertices that coincide with others; ``partners`` is filled in place.
     """
     involved = np.unique([*candidates, *chain.from_iterable(candidates.values())])
     touching = edges[np.isin(edges, involved).any(axis=1)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What hangs together in a triangle mesh: duplicate vertices, edges, connected and closed components."""
+"""Connectivity of triangle meshes: coincident vertices, edges, connected and closed components."""
 
 from __future__ import annotations
 
@@ -15,22 +15,30 @@ from ..arrays import Bools, Floats, Ints
 def welded(
     key0: Floats, key1: Floats, reach: tuple[float, float] = (0.0, 0.0), edges: Ints | None = None
 ) -> tuple[Ints, Ints]:
-    """Vertices that coincide in both keys (n, 3) count as one.
+    """Group the vertices that coincide in both keys, as those of seams do.
 
     Parameters
     ----------
     key0, key1 : (n, 3)
+        Positions in the first and in the second key.
     reach : tuple of float
-        How far apart along each axis vertices may be in the first and in the second key and still coincide.
+        For each key, how far apart along any axis coincident vertices may be.
     edges : (e, 2) int64, optional
-        Ends of an edge are no copies of each other: a group with such a pair in it only holds what coincides exactly.
+        The two ends of an edge are never grouped within the reach: a group that would contain an edge keeps only
+        exactly coincident vertices together.
 
     Returns
     -------
     representatives : (k,) int64
-        One vertex of each group.
+        One vertex of each group, ascending.
     group : (n,) int64
-        The group of every vertex: ``positions[representatives][group]`` are all positions, within the reach.
+        Group of every vertex; ``positions[representatives][group]`` equals ``positions`` within the reach.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.0, 0, 0]])
+    >>> welded(points, points)
+    (array([0, 1]), array([0, 1, 0]))
     """
     both = np.concatenate([key0, key1], axis=1)
     _, representatives, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
@@ -41,7 +49,7 @@ def welded(
         first = np.full(count, len(both))
         np.minimum.at(first, joined, representatives)
         representatives, group = first, joined[group]
-    # Groups in the order of the vertices keep sparse factors and reports in the mesh's own order.
+    # Groups in the order of the vertices keep matrices and reports in the mesh's own order.
     order = np.argsort(representatives)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
@@ -49,9 +57,9 @@ def welded(
 
 
 def _joined_groups(both: Floats, reach: tuple[float, float], edges: Ints | None) -> Ints:
-    """(k,) labels of points (k, 6), in both keys, that are joined within the reach and have no edge among them."""
+    """(k,) group of each point (k, 6), positions in both keys, joined within the reach unless edges forbid it."""
     count = len(both)
-    # In a key that is squashed into a point everything would be near everything.
+    # Search neighbors in the key that spreads further: in one that is squashed to a point, all vertices are neighbors.
     sizes = np.ptp(both, axis=0).reshape(2, 3).max(axis=1)
     key = int(np.argmin(np.divide(reach, sizes, out=np.full(2, np.inf), where=sizes > 0.0)))
     near = cKDTree(both[:, 3 * key : 3 * key + 3]).query_pairs(reach[key], p=np.inf, output_type="ndarray")
@@ -67,9 +75,9 @@ def _joined_groups(both: Floats, reach: tuple[float, float], edges: Ints | None)
 
 
 def without_piles(points: Floats, most: int) -> Ints:
-    """(k,) which points (n, 3) to keep, ascending: all, or, where more than ``most`` are in one place, one of each.
+    """(k,) indices of points (n, 3) to keep, ascending: all, or one of each place if more than ``most`` coincide.
 
-    Trees of points look at all that are in one place one by one, for every question.
+    A k-d tree cannot split coincident points and visits all of them in every query.
     """
     along = np.sort(points[:, 0] + points[:, 1] * np.sqrt(2.0) + points[:, 2] * np.sqrt(3.0))
     if len(along) <= most or not (along[most:] == along[:-most]).any():
@@ -80,12 +88,12 @@ def without_piles(points: Floats, most: int) -> Ints:
 
 
 def sides(faces: Ints) -> Ints:
-    """(3m, 2) the three edges of every triangle, smaller index first; edge k*m + j belongs to face j."""
+    """(3m, 2) the three edges of each triangle (m, 3), smaller vertex first; row k m + j is edge k of triangle j."""
     return np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
 
 
 def distinct(numbers: Ints) -> Ints:
-    """(k,) the numbers (n,) without repetition, sorted; many times faster than numpy's hashing from version 2.3 on."""
+    """(k,) the distinct numbers (n,), sorted; many times faster than ``np.unique``, which hashes from numpy 2.3 on."""
     ordered = np.sort(numbers)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
@@ -94,23 +102,23 @@ def distinct(numbers: Ints) -> Ints:
 
 
 def among(numbers: Ints, known: Ints) -> Bools:
-    """(n,) whether the numbers (n,) are among ``known`` (k,), which are sorted."""
+    """(n,) whether each number (n,) is among the sorted numbers ``known`` (k,)."""
     if not len(known):
         return np.zeros(len(numbers), dtype=bool)
     return np.asarray(known[np.minimum(np.searchsorted(known, numbers), len(known) - 1)] == numbers)
 
 
 def unique_edges(edges: Ints) -> Ints:
-    """(k, 2) edges without repetition and without loops."""
+    """(k, 2) distinct edges, smaller vertex first, without loops."""
     low, high = edges.min(axis=1), edges.max(axis=1)
     span = int(high.max(initial=0)) + 1
-    # One number for each edge sorts several times faster than pairs.
+    # Edges coded as single numbers sort several times faster than pairs.
     codes = distinct((low * span + high)[low != high])
     return np.stack([codes // span, codes % span], axis=1)
 
 
 def face_adjacency(faces: Ints) -> Ints:
-    """(k, 2) pairs of triangles that share an edge; around an edge with many triangles they form a chain."""
+    """(k, 2) pairs of triangles that share an edge; the triangles of a non-manifold edge are linked one to the next."""
     edges = sides(faces)
     owner = np.tile(np.arange(len(faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -120,15 +128,16 @@ def face_adjacency(faces: Ints) -> Ints:
 
 
 def vertex_components(edges: Ints, count: int) -> Ints:
-    """(count,) labels of the connected components of vertices joined by ``edges`` (k, 2)."""
+    """(count,) connected component, 0, 1, 2, ..., of each vertex in the graph with the given edges (k, 2)."""
     graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def closed_faces(faces: Ints, labels: Ints) -> Bools:
-    """(m,) triangles of components that enclose a volume; ``labels`` are per vertex.
+    """(m,) whether each triangle belongs to a component that encloses a volume; ``labels`` (n,) are by vertex.
 
-    Every edge has exactly two triangles there, whose normals agree: where they do not, the signed volume means nothing.
+    In such a component every edge has exactly two triangles with consistent orientation; otherwise a signed volume
+    would have no meaning.
     """
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     low, high = directed.min(axis=1), directed.max(axis=1)

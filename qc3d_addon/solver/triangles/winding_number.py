@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often a surface winds around points: inside and outside for open, crossing and many-part meshes too."""
+"""Generalized winding numbers: inside and outside, also of open, self-crossing and multi-part meshes."""
 
 from __future__ import annotations
 
@@ -11,37 +11,45 @@ from ..numerics.grouped_sums import means_by_label, sums_by_label
 from ..support.threads import in_threads
 from .geometry import face_normals
 
-OUTSIDE_WEIGHT = 1e-3
+OUTSIDE_WEIGHT = 1e-3  # small beside the inside's weight of 1, but enough to keep the system well conditioned
 
-_MOST_DIPOLES = 2_500  # groups of triangles are then about as large as the tetrahedra at the surface
-# Queries at once: few enough that their distances to all dipoles stay in the processor's cache.
-_CHUNK = 128
-_ROUNDING = 1e-14  # of squared distances in the cube
+_MOST_DIPOLES = 2_500  # clusters of triangles are then about as large as the tetrahedra at the surface
+_CHUNK = 128  # queries at once: few enough that their distances to all dipoles stay in the processor's cache
+_ROUNDING = 1e-14  # of squared distances in the unit cube
 
 
 def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
-    """Generalised winding numbers (Jacobson et al. 2013) of a triangle mesh around query points.
+    """Generalized winding numbers of a triangle mesh at query points.
 
-    Triangles act as dipoles, many triangles as few dipoles (the first-order expansion of Barill et al. 2018, "Fast
-    winding numbers for soups and clouds"), so values are approximate within about a triangle's or a cluster's size of
-    the surface and accurate beyond.
+    Each triangle acts as a dipole; large meshes are clustered into few dipoles (the first-order expansion of Barill et
+    al.). Values are therefore approximate closer to the surface than the size of a triangle or cluster, and accurate
+    farther away.
 
     Parameters
     ----------
-    points : (n, 3), faces : (m, 3)
-        The surface, cube units; it may be open, overlap itself or be in many parts.
+    points : (n, 3)
+        Vertices in cube units.
+    faces : (m, 3) int64
+        Triangles; the surface may be open, cross itself, or have many parts.
     queries : (k, 3)
+        Where to evaluate, in cube units.
 
     Returns
     -------
-    (k,) about 1 inside a closed surface that faces outwards, 0 outside, in between near holes.
+    (k,)
+        About 1 inside a closed surface whose normals point out, 0 outside, and values between near holes.
+
+    References
+    ----------
+    Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers", 2013. Barill et al., "Fast
+    winding numbers for soups and clouds", 2018.
     """
     centres, normals = _dipoles(points, faces)
     areas = np.linalg.norm(normals, axis=1)
-    # A disc of the dipole's area softens the singularity at its centre; rounding of the squares must not matter there.
+    # A disk of the dipole's area softens the singularity at its center, where rounding of squares must not matter.
     softening = np.maximum(areas / np.pi, _ROUNDING)
     moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centres)])
-    # Squares of distances as one product, (q, |q|^2, 1) times (-2 c, 1, |c|^2 + softening).
+    # All squared distances as one matrix product: (q, |q|^2, 1) times (-2 c, 1, |c|^2 + softening).
     dipoles = np.vstack([-2.0 * centres.T, np.ones(len(centres)), (centres**2).sum(axis=1) + softening])
 
     def summed(query: Floats) -> Floats:
@@ -55,22 +63,22 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
 
 
 def insideness(numbers: Floats) -> Floats:
-    """(k,) what volume counts by its winding numbers: 1 inside, ``OUTSIDE_WEIGHT`` outside, in between near holes.
+    """(k,) weight of the volume at places with these winding numbers (k,): 1 inside, ``OUTSIDE_WEIGHT`` outside.
 
-    Surfaces that are reversed (-1) or nested (2) have an inside all the same.
+    It lies between near holes. The inside of a reversed surface (-1) and of nested surfaces (2) counts as inside too.
     """
     return np.asarray(np.clip(np.abs(numbers), OUTSIDE_WEIGHT, 1.0))
 
 
 def _dipoles(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
-    """Centres and area vectors of at most about ``_MOST_DIPOLES`` groups of neighbouring triangles."""
+    """Centers and area vectors of at most about ``_MOST_DIPOLES`` clusters of neighboring triangles."""
     normals = 0.5 * face_normals(points, faces)
     centres = points[faces].mean(axis=1)
     if len(faces) <= _MOST_DIPOLES:
         return centres, normals
     areas = np.linalg.norm(normals, axis=1)
     cell = max(float(np.sqrt(2.0 * areas.sum() / _MOST_DIPOLES)), _ROUNDING)
-    # Triangles that face apart must not cancel: the octant of the normal is part of the group's key.
+    # Opposite triangles must not cancel, so the octant of the normal distinguishes clusters too.
     keys = np.column_stack([np.floor(centres / cell), normals > 0.0])
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = group.ravel()

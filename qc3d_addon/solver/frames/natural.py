@@ -46,7 +46,8 @@ class NaturalFrames:
         embedding, mesh = fitted.embedding, fitted.mesh
         self._surface = fitted.surface_path
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
-        if fitted.options.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
+        turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
+        if fitted.options.extra_turns and not turns:
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         faces = fitted.pair.welded_faces
         with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
@@ -54,7 +55,7 @@ class NaturalFrames:
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
-        self._placer = Placer(embedding, fitted.options.extra_turns)
+        self._placer = Placer(embedding, turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))

@@ -87,14 +87,15 @@ class Placer:
     Parameters
     ----------
     embedding : Embedding
-    extra_turns : int
-        With full turns that the keys cannot tell, straight lines between them tell nothing of the way.
+    turns : bool
+        Whether there are full turns that the keys cannot tell: straight lines then tell nothing of the way, and nothing
+        is placed.
     """
 
-    def __init__(self, embedding: Embedding, extra_turns: int = 0) -> None:
+    def __init__(self, embedding: Embedding, turns: bool = False) -> None:
         self._embedding = embedding
         self._inner = (False, False)
-        self._knows = extra_turns == 0
+        self._knows = not turns
         self._weights = _calm_weights(embedding.travel, embedding.weights)
 
     def beside(self, inner: tuple[bool, bool]) -> Placer:

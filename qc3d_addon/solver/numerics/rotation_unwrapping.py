@@ -67,7 +67,7 @@ class Turning:
 
 
 def consistent_turning(
-    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats
+    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats | None = None
 ) -> Turning:
     """Unwrap the rotations of all elements, so that neighbors agree, also beyond 180 and 360 degrees.
 
@@ -83,8 +83,8 @@ def consistent_turning(
         Positive weights of the elements when the axis of their part is computed.
     held : (m,) bool
         Whether an element has a still vertex.
-    rest : (3,)
-        Rotation vector of what is still: zero unless a motion of the whole was removed.
+    rest : (3,), optional
+        Rotation vector of what is still, where a motion of the whole was removed from everything.
 
     Notes
     -----
@@ -93,17 +93,20 @@ def consistent_turning(
     into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
     In each part the element that turns least takes the short way round; in a part with still vertices the one whose
-    rotation is nearest to ``rest``. A part without still vertices, such as a button on a sleeve, takes the branch of the
-    nearest element of the largest part.
+    rotation is nearest to ``rest``. A part without still vertices, such as a button on a sleeve, takes the branch of
+    the nearest element of the largest part.
     """
     count = len(turns)
     if not count:
         return Turning(turns.copy(), turns.copy())
     forest = _Forest(turns, adjacency)
     loose = ~np.isin(forest.labels, forest.labels[held])
-    resting = np.where(loose[:, None], 0.0, rest)
-    forest = forest.rooted(_relative_angles(turns, resting))
-    started = np.where(loose[:, None], turns, nearest_branch(turns, resting)) if rest.any() else turns
+    started, angles = turns, np.linalg.norm(turns, axis=1)
+    if rest is not None and rest.any():
+        resting = np.broadcast_to(rest, turns.shape)
+        angles = np.where(loose, angles, _relative_angles(turns, resting))
+        started = np.where(loose[:, None], turns, nearest_branch(turns, resting))
+    forest = forest.rooted(angles)
     vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)

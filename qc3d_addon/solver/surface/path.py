@@ -87,8 +87,10 @@ class SurfacePath:
         rest = -embedding.motion.turn
         neighbours = face_adjacency(usable.faces)
         self.turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, rest)
+        returned = np.zeros(count, dtype=bool)
         if free_after_turns:
-            still[usable.faces[self.turning.angles_from(rest) > np.pi]] = False
+            returned[usable.faces[self.turning.angles_from(rest) > np.pi]] = True
+            still &= ~returned
         self.still = still[self._group]
         self._free = ~still
         self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
@@ -104,7 +106,7 @@ class SurfacePath:
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
         # What hardly travels is drawn to its straight line, in the limit as if it were still.
         travel = np.maximum(embedding.travel[self.vertices], STILL_TOLERANCE)
-        self._line_weights = (NEARLY_STILL / travel) ** 4
+        self._line_weights = np.where(returned, 0.0, (NEARLY_STILL / travel) ** 4)
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
             usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights + self._line_weights

@@ -44,7 +44,8 @@ def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
     Their number follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
     """
     angles = np.degrees(path.turning.angles)
-    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
+    # Rounding must not make it one more.
+    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES - 1e-6))) if len(angles) else 1
     moments = [(step / steps, None) for step in range(1, steps)]
     # The shapes on the way only lead the map; they need not have settled.
     shapes = [shape for few in batches(moments, path.shapes_at_once) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]

@@ -3,6 +3,7 @@
 #
 #   make demo     bake the demo file; the results are left in demo/
 #   make test     everything: environment, ruff, mypy, pytest
+#   make quick    the solver's tests without the slow ones, for while you work: no Blender, under three minutes
 #   make assets   make the demo files again with the script that made them
 #   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
 #                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python
@@ -17,7 +18,7 @@ endif
 VENV := .venv-$(VERSION)
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint assets extension clean
+.PHONY: demo test quick lint assets extension clean
 
 KEYS := --object Arm --from Basis --to "Bend and twist"
 
@@ -33,6 +34,9 @@ demo: $(VENV)/installed
 
 test: $(VENV)/installed lint
 	$(BIN)/python -m pytest
+
+quick: $(VENV)/installed
+	$(BIN)/python -m pytest tests/solver -m "not slow"
 
 lint: $(VENV)/installed
 	$(BIN)/ruff check .

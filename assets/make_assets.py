@@ -32,7 +32,7 @@ def main(folder: Path) -> None:
 
 
 def build_limb() -> None:
-    """An arm along the x axis, in metres: chest, upper arm, forearm, and a hand with a thumb, as one closed surface."""
+    """An arm along the x axis, in meters: chest, upper arm, forearm, and a hand with a thumb, as one closed surface."""
     pieces = [
         _ball((-0.42, 0.0, -0.02), (0.48, 0.36, 0.62)),
         _ball((0.0, 0.0, 0.25), (0.4, 0.36, 0.38)),
@@ -100,7 +100,7 @@ def build_suzanne() -> None:
 
 
 def build_lid() -> None:
-    """An eyeball of radius 1 with a strong cornea towards -y, and an upper lid 2 % of the radius above it."""
+    """An eyeball of radius 1 with a strong cornea toward -y, and an upper lid 2 % of the radius above it."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=1.0)
     eyeball = bpy.context.object
     eyeball.name = eyeball.data.name = "Eyeball"

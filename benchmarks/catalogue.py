@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pairs of shapes that are measured, and the limits that the listed ones have."""
+"""The pairs of shapes that are measured, and the limits of the listed ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("QC3D_DATA", ROOT / "../shared/data")).resolve()
 PAIRS = Path(os.environ.get("QC3D_PAIRS", ROOT / "../shared/bench/pairs.json")).resolve()
 
-# Turns that two shapes cannot tell: a user asks for them by option, and so does the benchmark of ``natural``.
+# Two shapes cannot tell these full turns: a user asks for them by an option, and so does the benchmark of ``natural``.
 EXTRA_TURNS = {"bar:straight:twist450": 1, "bar:twist450:bend180": -1}
 
 
@@ -28,8 +28,8 @@ EXTRA_TURNS = {"bar:straight:twist450": 1, "bar:twist450:bend180": -1}
 class Pair:
     """Two shapes of one file, written ``body:rest:t_pose``.
 
-    ``ratios`` says by how much a measure must undercut the straight blend's, ``floors`` below which nobody sees a
-    difference.
+    For each measure with a limit, ``ratios`` has the largest allowed ratio to the straight blend's value, and
+    ``floors`` the value below which nobody sees a difference.
     """
 
     file: str
@@ -43,28 +43,28 @@ class Pair:
 
     @property
     def listed(self) -> bool:
-        """Whether the pair has limits of its own."""
+        """Whether the pair has limits."""
         return bool(self.ratios)
 
     @property
     def extra_turns(self) -> int:
-        """Full turns to ask for by option."""
+        """Extra turns to ask for by the option."""
         return EXTRA_TURNS.get(str(self), 0)
 
     def load(self) -> tuple[Ints, Floats, Floats]:
-        """Triangles, first shape, second shape."""
+        """Triangles (m, 3), first shape (n, 3), second shape (n, 3)."""
         with np.load(DATA / f"{self.file}.npz", allow_pickle=False) as stored:
             names = stored["shape_names"].tolist()
             first, second = (stored[f"V{names.index(name)}"].astype(np.float64) for name in (self.first, self.second))
             return stored["faces"].astype(np.int64), first, second
 
     def limits(self, straight: dict[str, Any]) -> dict[str, float]:
-        """The largest values allowed, from the straight blend's worst inner frame."""
+        """Largest allowed value of each measure, given the measures of the straight blend's worst inner frame."""
         return {name: max(straight[name] / ratio, self.floors[name]) for name, ratio in self.ratios.items()}
 
 
 class Catalogue:
-    """Every pair: the listed ones first, then every shape of a file against its rest shape, and neighbours."""
+    """All pairs: the listed ones, then the rest shape of a file with every other, then consecutive shapes."""
 
     def __init__(self) -> None:
         if not PAIRS.is_file() or not DATA.is_dir():
@@ -95,7 +95,7 @@ class Catalogue:
 
 
 def shape_names(family: str) -> list[str]:
-    """Names of the shapes in a file, the rest shape first; none where there is no such file."""
+    """Names of the shapes in a file, the rest shape first; empty if there is no such file."""
     if not (DATA / f"{family}.npz").is_file():
         return []
     with np.load(DATA / f"{family}.npz", allow_pickle=False) as stored:

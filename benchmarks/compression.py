@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How small maps become: bytes, folds and errors of the schemes beside quantised coordinates, as Markdown.
+"""Compression of maps: bytes, folds and errors of the schemes and of quantized coordinates, as Markdown tables.
 
     python -m benchmarks.compression --data FOLDER
 
-FOLDER holds head.npz and body.npz; the frames of a chain are read from FRAMES.npz of ``qc3d interpolate``, where given.
+FOLDER contains head.npz and body.npz. The frames of a chain are read from a FRAMES.npz of ``qc3d interpolate``, if
+given.
 """
 
 from __future__ import annotations

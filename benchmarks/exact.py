@@ -3,7 +3,8 @@
 """The exact in-betweens of a bar that is twisted or bent, as a yardstick.
 
 The bar stands along z around the origin. ``twist``: a cross-section at height h above the lower end turns about z by
-h / length of the angle. ``bend``: the middle line becomes an arc of the same length in the x-z plane, its middle stays.
+the fraction h / length of the angle. ``bend``: the center line becomes an arc of the same length in the x-z plane, and
+its middle stays in place.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def bent(straight: Floats, angle: float) -> Floats:
 
 
 def exact_shape(pair: Pair, straight: Floats, time: float) -> Floats | None:
-    """The exact in-between of the pair at the time; None where none is known."""
+    """The exact in-between of the pair at the time; None if it is not known."""
     match = re.fullmatch(r"(twist|bend)(\d+)", pair.second)
     if pair.file != "bar" or pair.first != "straight" or match is None:
         return None

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orders of elimination for the matrix of a surface: python -m benchmarks.factorizations [VERTICES ...]
+"""Elimination orders for a surface's matrix: python -m benchmarks.factorizations [VERTICES ...]
 
-Prints, for each order, seconds to find it, to factor, to solve for three right-hand sides, and the entries of L.
+Prints, for each order, the seconds to find it, to factor, and to solve for three right-hand sides, and the number of
+entries of L.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ _ANCHORS = 1e-6
 
 
 def cuthill_mckee(points: Floats, matrix: csr_array) -> Ints:
-    """The order of least bandwidth."""
+    """The reverse Cuthill-McKee order, for a small bandwidth."""
     return np.asarray(reverse_cuthill_mckee(matrix, symmetric_mode=True), dtype=np.int64)
 
 
-# By name: how the order is found, and what SuperLU itself orders by.
+# For each name: how the order is found, and which ordering SuperLU then applies.
 Spec = Literal["NATURAL", "MMD_AT_PLUS_A", "COLAMD"]
 ORDERS: tuple[tuple[str, Callable[[Floats, csr_array], Ints] | None, Spec], ...] = (
     ("nested dissection", elimination_order, "NATURAL"),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the fit grows with the tetrahedra: Newton steps, products with their matrices, seconds.
+"""Cost of the fit as the number of tetrahedra grows: Newton steps, matrix products, seconds.
 
     python -m benchmarks.fit [--cases body:rest:t_pose ...]
 """
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def _counting(solve: Callable[..., Any], products: list[int]) -> Callable[..., Any]:
-    """Conjugate gradients that note the number of their steps."""
+    """Wrap conjugate gradients so that they record their number of steps."""
 
     def counted(*arguments: Any, **options: Any) -> Any:  # noqa: ANN401
         steps: list[None] = []

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure in-betweens: QC3D beside the straight blend and two classical methods.
+"""Quality of in-betweens: QC3D, the straight blend, and two classical methods.
 
     python benchmarks/inbetweens.py                                   # every pair, every method, resumed
     python benchmarks/inbetweens.py --pairs body:rest:t_pose bar:straight:bend180 --methods straight natural
     python benchmarks/inbetweens.py --listed --check                  # exit status 1 where `natural` falls short
     python benchmarks/inbetweens.py --write   # the tables and sheets of docs/science/inbetweens.md
 
-The list of pairs and the shapes are found by QC3D_PAIRS and QC3D_DATA. Results are kept in a folder, one for each pair
-and method, and made again when the sources that they depend on have changed.
+The environment variables QC3D_PAIRS and QC3D_DATA say where the list of pairs and the shapes are. Results are stored in
+a folder, one for each pair and method, and computed again when the sources that they depend on have changed.
 """
 
 import os

@@ -4,9 +4,8 @@
 
     python -m benchmarks.large [VERTICES ...] [--engine ENGINE] [--quality QUALITY] [--frames FRAMES]
 
-The bodies of the data folder, each triangle divided into smaller ones until there are about so many vertices. The bake
-runs as Blender runs it, in a child process; memory is the largest sum, over this process's children and theirs, of
-what each has for itself and its share of the rest.
+The body of the data folder is subdivided until it has about the given number of vertices. The bake runs in a child
+process, as in Blender. The memory is the peak of the proportional set sizes (PSS) of all descendants of this process.
 """
 
 from __future__ import annotations
@@ -61,7 +60,7 @@ def main() -> None:
 
 
 def divided(pair: KeyPair, vertices: int) -> KeyPair:
-    """The pair with every triangle divided into four, again and again, until it has so many vertices or more."""
+    """The pair with every triangle split into four, repeatedly, until it has at least the given number of vertices."""
     key0, key1, faces = pair.key0, pair.key1, pair.faces
     while len(key0) < vertices:
         edges, place = np.unique(np.sort(sides(faces), axis=1), axis=0, return_inverse=True)
@@ -74,7 +73,7 @@ def divided(pair: KeyPair, vertices: int) -> KeyPair:
 
 
 class PeakMemory:
-    """Watches this process's children while the block runs."""
+    """Context manager that measures the peak memory of this process's descendants during its block."""
 
     def __init__(self) -> None:
         self.megabytes = 0.0
@@ -92,7 +91,7 @@ class PeakMemory:
         self._watch.join()
 
     def note(self, progress: Progress) -> None:
-        """Note which stage the work is in."""
+        """Record the stage that the work is in."""
         self._stage = progress.stage
 
     def _look(self) -> None:

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many triangles of the lid cross the eyeball while it closes; python -m benchmarks.lid prints the docs' table.
+"""Triangles of an eyelid that cross the eyeball while it closes, with and without colliders.
 
-The demo file ``assets/lid.blend`` is baked with and without colliders, with the engine ``delaunay``.
+``python -m benchmarks.lid`` bakes the demo file ``assets/lid.blend`` with the engine ``delaunay`` and prints the table
+of the documentation.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def main() -> None:
 
 
 def crossings(lid: bpy.types.Object, shapes: list[Floats]) -> list[int]:
-    """For each shape (n, 3) of the lid the pairs of one of its triangles and one of the eyeball that cross."""
+    """Number of crossing pairs of a triangle of the lid and one of the eyeball, for each shape (n, 3) of the lid."""
     eyeball = bpy.data.objects["Eyeball"].data
     points = np.array([vertex.co[:] for vertex in eyeball.vertices])
     faces = triangles(lid.data)

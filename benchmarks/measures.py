@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator sees in a sequence of shapes, as figures; nothing here knows how the frames were made.
+"""Measures of what an animator sees in a sequence of shapes, independent of how the frames were made.
 
 Measures of one frame at time t (0 is perfect)
     edge_excess_p99, edge_excess_mean
@@ -10,20 +10,19 @@ Measures of one frame at time t (0 is perfect)
         The same for triangle areas, mean over the triangles.
     volume_dev
         Relative difference between the volume of the closed components and the straight blend of the keys' volumes;
-        None where no component is closed.
+        None if no component is closed.
     intersections
         Crossing pairs of triangles without a common vertex, beyond the larger count of the two keys; None without
         Blender's BVH tree.
     still_drift
-        Largest distance from their place of the vertices that both keys leave in place, relative to the bounding-box
-        diagonal; None where every vertex moves.
+        Largest distance of a still vertex from its place, relative to the bounding-box diagonal; None if there is none.
     arc
-        Mean distance from the straight path relative to the mean distance travelled; informative only.
+        Mean distance from the straight path relative to the mean distance traveled; for information only.
 Measures of a sequence
     key_error
         Largest coordinate difference between the first and last frame and the keys, relative to the diagonal.
     jerk
-        Largest second difference of a vertex relative to the largest single step: a jump shows here.
+        Largest second difference of a vertex relative to the largest single step; a jump shows here.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ from scipy.sparse.csgraph import connected_components
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-STILL = 1e-6  # of the diagonal: what moves less counts as left in place
+STILL = 1e-6  # of the diagonal: vertices that move less between the keys count as still
 WORST = (
     "edge_excess_p99", "edge_excess_mean", "area_excess_mean", "volume_dev", "intersections", "still_drift", "arc",
 )  # fmt: skip
@@ -50,7 +49,7 @@ def diagonal(positions: Floats) -> float:
 
 
 def edge_uses(faces: Ints) -> tuple[Ints, Ints]:
-    """Edges (e, 2) of the triangles, each once, and how many triangles use each of them."""
+    """The distinct edges (e, 2) of the triangles, and how many triangles use each edge."""
     sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, uses = np.unique(sides, axis=0, return_counts=True)
     return edges, uses
@@ -74,7 +73,7 @@ def enclosed_volume(positions: Floats, faces: Ints) -> float:
 
 
 def closed_triangles(faces: Ints) -> NDArray[np.bool_]:
-    """Mask (m,) of the triangles whose component has exactly two triangles at every edge."""
+    """(m,) whether each triangle belongs to a component that has exactly two triangles at every edge."""
     edges, uses = edge_uses(faces)
     size = int(faces.max()) + 1
     graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(size, size))
@@ -87,7 +86,7 @@ def closed_triangles(faces: Ints) -> NDArray[np.bool_]:
 def excess(values: Floats, first: Floats, second: Floats, floor: float) -> Floats:
     """Relative distance of each value from the interval between its two key values.
 
-    ``floor`` bounds the divisor from below, so that a vanishing edge or triangle does not count infinitely.
+    ``floor`` bounds the divisor from below, so that a vanishing edge or triangle does not count as infinite.
     """
     low, high = np.minimum(first, second), np.maximum(first, second)
     below = (low - values) / np.maximum(low, floor)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ways to make in-betweens that are compared."""
+"""The methods that are compared."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ METHODS = ("straight", "poisson", "arap", *OURS)
 
 
 class Outcome(NamedTuple):
-    """In-betweens (k, n, 3), the seconds they took, and what the method says about itself."""
+    """In-betweens (k, n, 3), the seconds they took, and the method's own report."""
 
     frames: Floats
     seconds: float
@@ -34,9 +34,9 @@ class Outcome(NamedTuple):
 
 
 class Contest:
-    """Runs methods on one pair of shapes; the map that both modes of QC3D start from is fitted once.
+    """Runs methods on one pair of shapes; both modes of QC3D share one fit.
 
-    ``choices`` are settings of QC3D, such as the engine and the quality.
+    ``choices`` are options of QC3D, such as the engine and the quality.
     """
 
     def __init__(self, faces: Ints, key0: Floats, key1: Floats, times: Floats, choices: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of the results, as Markdown."""
+"""Markdown tables of the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ORDER = tuple(method for method in ("straight", "linear", "poisson", "arap", "na
 
 
 def figure(value: float | None) -> str:
-    """A relative measure with two or three digits that matter."""
+    """A relative measure with two or three significant digits."""
     if value is None:
         return "-"
     return "0" if value < 5e-6 else f"{value:.2g}" if value < 0.1 else f"{value:.3f}"
@@ -32,7 +32,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def measure_table(verdicts: Sequence[Verdict], measure: str) -> str:
-    """One measure: every method, the limit, and whether `natural` is better than the classical methods."""
+    """Table of one measure: all methods, the limit, and whether `natural` is better than the classical methods."""
     methods = [method for method in ORDER if any(method in verdict.figures for verdict in verdicts)]
     rows = []
     for verdict in verdicts:
@@ -46,7 +46,7 @@ def measure_table(verdicts: Sequence[Verdict], measure: str) -> str:
 
 
 def health_table(verdicts: Sequence[Verdict], method: str = "natural") -> str:
-    """What must always hold, and the cost."""
+    """Table of what must always hold, and of the cost."""
     rows = []
     for verdict in verdicts:
         result = verdict.figures.get(method)
@@ -79,7 +79,7 @@ def health_table(verdicts: Sequence[Verdict], method: str = "natural") -> str:
 
 
 def exact_table(verdicts: Sequence[Verdict]) -> str:
-    """Largest distance from the exact in-betweens, where they are known."""
+    """Table of the largest distance from the exact in-betweens, where these are known."""
     known = [v for v in verdicts if any(figures.get("exact_distance") is not None for figures in v.figures.values())]
     methods = [method for method in ORDER if any(method in verdict.figures for verdict in known)]
     rows = [
@@ -90,7 +90,7 @@ def exact_table(verdicts: Sequence[Verdict]) -> str:
 
 
 def document(verdicts: Sequence[Verdict]) -> str:
-    """Everything that goes between the markers of the document."""
+    """Everything between the markers of the document."""
     listed = [verdict for verdict in verdicts if verdict.pair.listed]
     further = [verdict for verdict in verdicts if not verdict.pair.listed]
     parts = [summary(verdicts)] if any("natural" in verdict.figures for verdict in verdicts) else []
@@ -129,7 +129,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def write_between_markers(path: Path, text: str, writer: str = WRITER) -> None:
-    """Replace what stands between the markers of a document that name the writer."""
+    """Replace the text between the markers of a document that name the writer."""
     begin, end = (marker.replace(WRITER, writer) for marker in (BEGIN, END))
     whole = path.read_text(encoding="utf-8")
     before, found, rest = whole.partition(begin)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results on disk, so that a benchmark can be resumed: a JSON of figures and an .npz of frames per pair and method."""
+"""Stored results, so that a benchmark can be resumed: a JSON of figures and an .npz of frames per pair and method."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .methods import METHODS, OURS
 
 
 def revision() -> str:
-    """The commit that is measured, with a plus where the working tree differs from it."""
+    """The commit that is measured, with a plus sign if the working tree differs from it."""
     head = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
     if head.returncode != 0:
         return "unknown"
@@ -26,7 +26,7 @@ def revision() -> str:
 
 
 def fingerprint(method: str) -> str:
-    """Hash of the sources that a result depends on: other sources, other results."""
+    """Hash of the sources that a result of the method depends on."""
     folder = "qc3d_addon/solver" if method in OURS else "benchmarks/classical"
     sources = sorted((ROOT / folder).glob("*.py")) + [ROOT / "benchmarks/measures.py"]
     digest = hashlib.sha256()
@@ -38,7 +38,7 @@ def fingerprint(method: str) -> str:
 class Results:
     """The folder of results for one choice of in-betweens, engine and quality.
 
-    Sources are looked at once, here: a result belongs to those that this process has loaded, even if they are edited
+    Sources are hashed once, here: a result belongs to the sources that this process has loaded, even if they are edited
     while it runs.
     """
 
@@ -54,7 +54,7 @@ class Results:
         return self.folder / ("_".join(parts) + suffix)
 
     def load(self, pair: Pair, method: str, *, current: bool = True) -> dict[str, Any] | None:
-        """The stored figures; None where there are none or, with ``current``, none of these sources."""
+        """The stored figures; None if there are none or, with ``current``, if they come from other sources."""
         path = self._path(pair, method, ".json")
         if not path.is_file():
             return None
@@ -62,7 +62,7 @@ class Results:
         return None if current and result["fingerprint"] != self._fingerprints[method] else result
 
     def store(self, pair: Pair, method: str, result: dict[str, Any]) -> None:
-        """Store figures under the sources that this process runs."""
+        """Store figures together with the hash of the sources."""
         self.folder.mkdir(parents=True, exist_ok=True)
         stamped = {"revision": self._revision, "fingerprint": self._fingerprints[method]} | result
         self._path(pair, method, ".json").write_text(json.dumps(stamped, indent=1), encoding="utf-8")
@@ -74,7 +74,7 @@ class Results:
         np.savez_compressed(path, faces=faces, times=times, frames=frames.astype(np.float32))
 
     def load_frames(self, pair: Pair, method: str) -> tuple[Ints, Floats, Floats] | None:
-        """Faces, times, frames; None where there are none."""
+        """Stored triangles, times and frames; None if there are none."""
         path = self._path(pair, method, ".npz")
         if not path.is_file():
             return None

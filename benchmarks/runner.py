@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure pairs in up to two processes, then print, write and check what came out."""
+"""Measures pairs in up to two processes, then prints, writes and checks the results."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DOCUMENT = ROOT / "docs/science/inbetweens.md"
 
 
 def measure_pair(pair: Pair, methods: list[str], results: Results) -> str:
-    """Run the methods on the pair, store figures and frames; returns a line for the log."""
+    """Run the methods on the pair and store figures and frames; return a line for the log."""
     faces, key0, key1 = pair.load()
     times = np.linspace(0.0, 1.0, results.inner_frames + 2)
     judge = Judge(faces, key0, key1)
@@ -33,7 +33,7 @@ def measure_pair(pair: Pair, methods: list[str], results: Results) -> str:
     for method in methods:
         try:
             outcome = contest.run(method)
-        except Exception as error:  # whatever it is, it is a result, and the other pairs still run
+        except Exception as error:  # any failure is a result too, and the other pairs must still run
             said.append(f"{method}: {type(error).__name__}: {error}")
             results.store(pair, method, {"error": said[-1], "worst": {}, "details": {}})
             continue
@@ -56,7 +56,7 @@ def measure_pair(pair: Pair, methods: list[str], results: Results) -> str:
 
 
 def shortfalls(verdicts: list[Verdict]) -> list[str]:
-    """Where `natural` misses a limit, or is visibly worse than a classical method in lengths or volume."""
+    """Sentences on where `natural` misses a limit, or is visibly worse than a classical method."""
     found = []
     for verdict in verdicts:
         if "natural" not in verdict.figures:

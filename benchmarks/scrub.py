@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast live scrub is, and how near: python -m benchmarks.scrub [FOLDER OF THE DATA].
+"""Speed and accuracy of live scrub: python -m benchmarks.scrub [FOLDER OF THE DATA].
 
-For each pair: the error of the preview against frames computed at times it does not know, the seconds until it shows
-(a child process makes the frames from the kept map) and those of the processor's time among them, its memory, the time
-to evaluate it, and the time of a whole step in Blender, from the slider to the evaluated mesh with its normals, without
-drawing. The last two are medians, which other work on the same machine changes least.
+For each pair: the error of the preview at times between its frames; the seconds until it is ready, for which a child
+process computes the frames from the kept map, and the processor time among them; its memory; the time to evaluate it;
+and the time of a whole step in Blender, from the slider to the evaluated mesh with normals, without drawing. The last
+two are medians, which other work on the same machine affects least.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from qc3d_addon.solver.fit.storage import to_bytes
 from qc3d_addon.solver.frames.bake import evenly_spaced
 from qc3d_addon.solver.frames.preview import PreviewCurve
 from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.frames.weights import Weights
 from qc3d_addon.solver.keys.files import read_pair
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import FitOptions
@@ -33,7 +34,7 @@ from .catalogue import DATA
 
 PAIRS = (("body", "rest", "t_pose"), ("body", "rest", "arms_overhead"), ("head", "neutral", "jawOpen"))
 STEPS = (24, 48)
-BAKED_STEPS = 4
+BAKED = Weights.smooth(np.linspace(0.0, 1.0, 7))
 _BETWEEN = (0.031, 0.17, 0.262, 0.443, 0.51, 0.689, 0.813, 0.987)
 _EVALUATIONS = 200
 _UPDATES = 60
@@ -60,7 +61,7 @@ def main(arguments: list[str]) -> None:
             error = max(np.abs(curve.at(time) - frame).max() for time, frame in zip(_BETWEEN, known, strict=True))
             marks = [clock.perf_counter()]
             for number in range(_EVALUATIONS):
-                curve.beyond_blend(number / _EVALUATIONS, BAKED_STEPS)
+                curve.beyond(number / _EVALUATIONS, BAKED)
                 marks.append(clock.perf_counter())
             print(
                 f"| {file} {first} → {second} | {len(pair.key0)} | {steps} | {error / pair.diagonal:.1e} "
@@ -71,7 +72,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _processor_seconds() -> float:
-    """Seconds that this process and its children that ended had of the processor."""
+    """Processor seconds used by this process and by its children that have ended."""
     return sum(
         usage.ru_utime + usage.ru_stime
         for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -79,7 +80,7 @@ def _processor_seconds() -> float:
 
 
 def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
-    """Seconds from a place of the slider to the mesh that is drawn."""
+    """Median seconds from moving the slider to the evaluated mesh."""
     import bpy
 
     from qc3d_addon.blender.store.mesh_data import key_coordinates, set_key_coordinates
@@ -90,16 +91,16 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     obj = bpy.data.objects.new("Object", mesh)
     bpy.context.collection.objects.link(obj)
     obj.shape_key_add(name="Basis")
-    for step in range(1, BAKED_STEPS + 1):
-        key = obj.shape_key_add(name=str(step), from_mix=False)
-        set_key_coordinates(key, curve.at(step / BAKED_STEPS))
+    for knot in BAKED.knots[1:]:
+        key = obj.shape_key_add(name=str(knot), from_mix=False)
+        set_key_coordinates(key, curve.at(knot))
         key.value = 0.5
     preview = obj.shape_key_add(name="Preview", from_mix=False)
     preview.value = 1.0
     marks = [clock.perf_counter()]
     for number in range(_UPDATES):
         basis = key_coordinates(obj, "Basis")
-        set_key_coordinates(preview, basis + curve.beyond_blend(number / _UPDATES, BAKED_STEPS))
+        set_key_coordinates(preview, basis + curve.beyond(number / _UPDATES, BAKED))
         mesh.shape_keys.update_tag()
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         evaluated.corner_normals[0].vector.copy()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact sheets: one pair of each family, every method below the other."""
+"""Contact sheets: one pair of each family, one method per row."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TITLES = {"straight": "straight", "linear": "linear", "poisson": "Poisson", "ara
 
 
 def save(results: Results, folder: Path) -> list[Path]:
-    """Draw the sheets of every family whose frames are there; returns the files written."""
+    """Draw the sheets of all families whose frames are stored; return the files written."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for pair in SHOWN:

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fold-free fit beside SLIM, on the same tetrahedra, landmarks and path: python -m benchmarks.slim [PAIR ...]
+"""The fold-free fit against SLIM, with the same tetrahedra, landmarks and path: python -m benchmarks.slim [PAIR ...]
 
-SLIM (Rabinovich et al. 2017, "Scalable locally injective mappings") is run as libigl ships it, with the symmetric
-Dirichlet energy. It takes vertices as landmarks, so it is fed with vertex targets that fit the landmarks in the
-least-squares sense. It walks the same path to the second key, and at each step iterates until its landmarks are missed
-by no more than ours, or the energy stalls. CPU seconds of this process, one thread; the path itself is not counted.
+SLIM (Rabinovich et al. 2017, "Scalable locally injective mappings") runs as shipped with libigl, with the symmetric
+Dirichlet energy. Its landmarks must be vertices, so it gets vertex targets that fit our landmarks by least squares. It
+follows the same path to the second key, and at each step iterates until its residual is no larger than ours or its
+energy stalls. Times are CPU seconds of this process in one thread, without those of the path itself.
 """
 
 from __future__ import annotations
@@ -54,21 +54,21 @@ class Problem:
         self.targets = path_to(SurfacePath(self.embedding), self.embedding.key1)
 
     def missed(self, values: Floats, target: Floats) -> float:
-        """Root mean square distance of landmarks from their targets, in cube units."""
+        """Residual: root mean square distance of the landmarks from their targets, in cube units."""
         squares = ((self.landmarks @ values - target) ** 2).sum(axis=1)
         return float(np.sqrt(self.embedding.weights @ squares))
 
     def folds(self, values: Floats) -> int:
-        """Tetrahedra that are turned inside out."""
+        """Number of inverted tetrahedra."""
         return int((determinants(self.mesh.jacobians(values)) <= 0.0).sum())
 
     def fitted(self) -> Floats:
-        """Our fit to the last target by way of the others, as a bake does it."""
+        """Our fit to the last target along the path, as in a bake."""
         fitter = FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
         return np.asarray(finish(follow_path(fitter, self.targets)).maps[-1])
 
     def fitted_by_slim(self, goal: float) -> tuple[Floats, int]:
-        """SLIM's map by the same way, and how many iterations it took; ends when the last target is missed by goal."""
+        """SLIM's map along the same path, and its number of iterations; it ends when its residual reaches ``goal``."""
         mesh, weights = self.mesh, self.embedding.weights
         laplacian = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(
             stiffness_elements(mesh.volumes, mesh.gradients)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the stages are timed on: real pairs, and a sphere of any number of vertices that becomes a bent limb."""
+"""Shapes for timing: real pairs, and a sphere with any number of vertices that becomes a bent limb."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qc3d_addon.solver.triangles.geometry import face_normals
 
 from .catalogue import Floats, Ints, Pair
 
-# Pairs that have a limit of time, with the largest part of the yardstick that a cold bake may take by engine.
+# Pairs with a time limit: for each engine, the largest allowed ratio of a cold bake to the yardstick.
 LIMITS = {
     "body:rest:t_pose": {"delaunay": 0.15, "tetwild": 0.6},
     "head:neutral:jawOpen": {"delaunay": 0.15, "tetwild": 0.6},
@@ -25,7 +25,7 @@ _BEND = np.radians(100.0)
 
 
 def load(case: str) -> tuple[Ints, Floats, Floats]:
-    """Triangles, first and second shape of a case: ``body:rest:t_pose``, or ``limb:10000`` for so many vertices."""
+    """Triangles, first and second shape of a case: ``body:rest:t_pose``, or ``limb:10000`` with 10,000 vertices."""
     if case.startswith("limb:"):
         return limb(int(case.removeprefix("limb:")))
     file, first, second = case.split(":")
@@ -33,7 +33,7 @@ def load(case: str) -> tuple[Ints, Floats, Floats]:
 
 
 def limb(count: int) -> tuple[Ints, Floats, Floats]:
-    """A sphere of ``count`` vertices, and the limb that it becomes: drawn out along z, then bent about its middle."""
+    """A sphere with ``count`` vertices, and the limb that it becomes: stretched along z, then bent in its middle."""
     along = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     around = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
     radius = np.sqrt(1.0 - along**2)

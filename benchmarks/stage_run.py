@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time the stages of one bake in a process of its own, and print them as JSON.
+"""Time the stages of one bake, in a process of its own, and print them as JSON.
 
     python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS       the stages and the warm bake
     python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS one   also one frame and its floor
@@ -52,7 +52,7 @@ def main(arguments: list[str]) -> None:
 
 
 def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
-    """Seconds of each stage of a cold bake and of a warm one; if so wished, of one frame and its floor."""
+    """Seconds of each stage of a cold bake and of a warm one; if ``one``, also of a single frame and its floor."""
     started = clock.perf_counter()
     from qc3d_addon.solver.api import Fit
     from qc3d_addon.solver.fit.fit_pair import fit_pair
@@ -88,7 +88,7 @@ def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
 
 
 def _one_frame(fitted: FittedMap) -> dict[str, float]:
-    """Seconds of one frame, of the back-substitutions in it, and of the same ones by themselves, over and over."""
+    """Seconds of one frame, of its back-substitutions, and of the same back-substitutions repeated on their own."""
     from qc3d_addon.solver.frames import volume_path
     from qc3d_addon.solver.frames.natural import NaturalFrames
     from qc3d_addon.solver.numerics.nested_dissection import factored
@@ -116,7 +116,7 @@ def _one_frame(fitted: FittedMap) -> dict[str, float]:
 
 
 class _Stopwatch:
-    """Factors that count the seconds of their back-substitutions."""
+    """Factors that measure the seconds of their back-substitutions."""
 
     def __init__(self, factors: SuperLU) -> None:
         self._factors = factors
@@ -164,7 +164,7 @@ def yardstick(case: str) -> dict[str, Any]:
 
     faces, key0, _ = stage_cases.load(case)
     with tempfile.TemporaryDirectory(prefix="qc3d-") as folder:
-        os.chdir(folder)  # fTetWild leaves a file of its own where it runs
+        os.chdir(folder)  # fTetWild leaves a file in the working folder
         started = clock.perf_counter()
         _, tets = tetrahedralize(key0, faces.astype(np.int32))
         seconds = clock.perf_counter() - started

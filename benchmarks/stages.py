@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time every stage of a bake, each case in a process of its own.
+"""Times of all stages of a bake, each case in a process of its own.
 
     python -m benchmarks.stages                                  # real pairs, both engines, against the yardstick
     python -m benchmarks.stages --growth                         # the limb that a sphere becomes, 1k to 200k vertices
@@ -93,12 +93,12 @@ def growth(frames: int) -> str:
 
 
 def compare(revision: str, cases: list[str], engines: list[str], frames: int) -> None:
-    """Print, for each stage, the median of this revision's time over the other's, the two measured in turn."""
+    """Print, for each stage, the median ratio of this revision's time to the other's; the two run alternately."""
     with tempfile.TemporaryDirectory(prefix="qc3d-") as name:
         other = Path(name) / "other"
         subprocess.run(["git", "worktree", "add", "--detach", "--quiet", str(other), revision], cwd=ROOT, check=True)
         try:
-            # The other revision is measured by this one's means.
+            # The other revision is measured with this revision's benchmark.
             for file in ("stage_run.py", "stage_cases.py"):
                 (other / "benchmarks" / file).write_bytes((ROOT / "benchmarks" / file).read_bytes())
             rows = []

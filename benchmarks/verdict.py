@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the figures say: limits kept or missed, classical methods beaten or not, as rows of tables."""
+"""Verdicts on the figures: limits that are kept or missed, and the comparison with the classical methods."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Verdict:
     always: dict[str, float]
 
     def worst(self, method: str, measure: str) -> float | None:
-        """A measure's worst inner frame; None where it was not measured or does not apply."""
+        """The worst value of a measure over the inner frames; None if it was not measured or does not apply."""
         if method not in self.figures:
             return None
         value = self.figures[method]["worst"].get(measure)
@@ -30,18 +30,18 @@ class Verdict:
 
     @property
     def limits(self) -> dict[str, float]:
-        """The limits of this pair alone."""
+        """The limits of this pair."""
         return self.pair.limits(self.figures["straight"]["worst"]) if "straight" in self.figures else {}
 
     def misses(self, method: str = "natural") -> list[str]:
-        """Every limit that the method does not keep, as a sentence fragment with both figures."""
+        """All limits that the method misses, each as a phrase with both figures."""
         result = self.figures[method]
         if "error" in result:
             return [f"failed: {result['error']}"]
         found = []
         limits = self.limits | self.always
         if self.pair.extra_turns:
-            limits.pop("still_drift")  # what is back in its place after whole turns is asked to turn
+            limits.pop("still_drift")  # vertices that return to their place after full turns are asked to turn
         for measure, limit in limits.items():
             value = always_measure(result, measure)
             if value is not None and not value <= limit:
@@ -62,7 +62,7 @@ class Verdict:
 def always_measure(result: dict[str, Any], measure: str) -> float | None:
     """A measure of a stored result by its name in the list of limits.
 
-    The error at the keys is the one before QC3D puts the keys themselves in the place of the frames computed there.
+    The error at the keys is that of the frames computed there, before QC3D replaces them by the keys themselves.
     """
     report = result["details"].get("report")
     if measure == "key_error":

@@ -5,8 +5,8 @@
 import sys
 from pathlib import Path
 
-# Python looks into the working folder first here, where a file may have the name of a library. Last is early enough,
-# and only where the working folder is the one that this package lies in.
+# With -m, Python searches the working folder first, where a file may have the name of a library. Search it last, and
+# only if it is the folder that contains this package.
 if not sys.flags.safe_path and sys.path:
     folder = sys.path.pop(0)
     if Path(folder).resolve() == Path(__file__).resolve().parents[1]:

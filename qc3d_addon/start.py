@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where processes of our own begin, before numpy is loaded: the command ``qc3d``, and the child of the add-on."""
+"""Start of our own processes, before numpy is loaded: the command ``qc3d``, and the add-on's child process."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import signal
 
 from .cli import speech
 
-# The system or the user asks to end, the terminal is closed, Ctrl-\\, and Ctrl-Break.
+# A request of the system or the user, a closed terminal, Ctrl-\\, and Ctrl-Break.
 _REQUESTS_TO_END = ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
 
 
 def main() -> int:
-    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main.main`. A request to end is treated as Ctrl-C is."""
+    """Run the command ``qc3d``; see :func:`qc3d_addon.cli.main.main`. Requests to end are treated like Ctrl-C."""
     try:
         speech.open_streams()
         for name in _REQUESTS_TO_END:
             number = getattr(signal, name, None)
-            # What is ignored from the start stays so: nohup lets a command go on when the terminal is closed.
+            # Signals that are ignored from the start stay ignored: nohup relies on that.
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, signal.default_int_handler)
         one_thread_each()
         try:
-            from .cli.main import main as run  # loading the libraries takes a while, in which Ctrl-C may come
-        except Exception as error:  # whatever a library of another Python, or another file of its name, does
+            from .cli.main import main as run  # takes a while, during which Ctrl-C may be pressed
+        except Exception as error:  # a library for another Python, or another file with its name, may raise anything
             speech.note(_not_loaded(error))
             return 2
         return run()
@@ -35,9 +35,9 @@ def main() -> int:
 
 
 def one_thread_each() -> None:
-    """Let BLAS work in the thread that calls it, unless the user has said otherwise.
+    """Make BLAS compute in the calling thread, unless the user has chosen otherwise.
 
-    Frames are made in threads of their own already; more threads inside each would only wait for one another.
+    Frames are computed in several threads already; more threads inside each would only wait for one another.
     """
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
         os.environ.setdefault(variable, "1")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests of all parts share: where the repository and the optional real meshes are, and a small pair of keys."""
+"""Shared by all tests: where the repository and the optional real meshes are, and a small pair of keys."""
 
 from __future__ import annotations
 

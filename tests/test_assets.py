@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shipped demo files are what their script makes, and worth baking."""
+"""The shipped demo files are exactly what their script makes, and can be baked."""
 
 from __future__ import annotations
 

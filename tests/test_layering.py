@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays go down, frames come up: packages import from lower floors only, no two modules import each other in a circle,
-and nothing below the Blender layer knows of Blender."""
+"""The layering of the code: packages import from lower floors only, modules do not import each other in a circle, and
+nothing below the Blender layer imports Blender's modules.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +24,7 @@ SOLVER_FLOORS = (
     ("surface", "collision", "maps"),
     ("fit", "compression"),
     ("frames",),
+    ("combinations",),
     ("steps",),
     ("api",),
 )

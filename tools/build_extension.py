@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the extension packages, one for each platform, with the wheels that Blender's Python lacks.
+"""Build the extension packages, one for each platform, including the wheels that Blender's Python lacks.
 
-The wheels are those of ``tools/extension_wheels.sha256``, fetched into a cache once. Every package is read back after
-it is written, compared with what it should hold, and given to Blender's own validator; one that fails is not left.
+The wheels are pinned in ``tools/extension_wheels.sha256`` and downloaded once into a cache. Every package is read back,
+compared with what it should contain, and checked by Blender's own validator; a package that fails is removed.
 
     python tools/build_extension.py [--platform linux-x64] [--extra-python 3.14]
 """
@@ -28,8 +28,8 @@ NOTICES = Path(__file__).with_name("extension_notices.txt")
 CACHE = REPOSITORY / ".wheels"
 MANIFEST = "blender_manifest.toml"
 
-# Blender's platforms: the platforms of wheels, and the Pythons of the Blenders there are for it. Blender 4.5 was the
-# last for Intel Macs.
+# For each of Blender's platforms: the platform tags of wheels, and the Python versions of the supported Blenders.
+# Blender 4.5 is the last one for Intel Macs.
 PLATFORMS = {
     "linux-x64": (r"manylinux.*_x86_64", ("3.11", "3.13")),
     "windows-x64": (r"win_amd64", ("3.11", "3.13")),
@@ -37,12 +37,12 @@ PLATFORMS = {
     "macos-arm64": (r"macosx_.*_arm64", ("3.11", "3.13")),
     "macos-x64": (r"macosx_.*_x86_64", ("3.11",)),
 }
-_REQUIRED = "scipy"  # without pytetwild the other engine does the work, without scipy nothing runs
+_REQUIRED = "scipy"  # nothing runs without scipy; without pytetwild, the engine delaunay still works
 _LICENCE_NAME = re.compile(r"(licen[cs]e|copying|notice)", re.IGNORECASE)
 
 
 class BuildError(Exception):
-    """Why there is no package, as a sentence."""
+    """No package can be built; the message is a sentence that says why."""
 
 
 class UnreachableError(BuildError):
@@ -51,14 +51,14 @@ class UnreachableError(BuildError):
 
 @dataclass(frozen=True)
 class Wheel:
-    """One line of the pins.
+    """A pinned wheel.
 
     Parameters
     ----------
-    file
-        Name of the wheel: package, version, Python, ABI and platform, separated by hyphens.
-    sha256
-        Of the wheel, in hexadecimal digits.
+    file : str
+        File name of the wheel: package, version, Python, ABI and platform, separated by hyphens.
+    sha256 : str
+        Its hash in hexadecimal digits.
     """
 
     file: str
@@ -71,7 +71,7 @@ class Wheel:
         return package, version, python, abi, platform
 
     def serves(self, platform: str, python: str) -> bool:
-        """Whether a Python such as "3.13" on one of Blender's platforms can load the wheel."""
+        """Whether a Python version such as "3.13" can load the wheel on one of Blender's platforms."""
         _, _, tag, abi, wheel_platform = self.parts
         oldest = (int(tag[2]), int(tag[3:]))
         wanted = tuple(int(number) for number in python.split("."))
@@ -103,7 +103,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def build(platform: str, folder: Path, extra_pythons: list[str]) -> Path:
-    """Fetch the wheels of one platform, write its package into ``folder``, and check it; raises BuildError."""
+    """Download the wheels of one platform, write its package into ``folder`` and check it; raises BuildError."""
     wheels = chosen(read_pins(), platform, extra_pythons)
     files = [fetch(wheel) for wheel in wheels]
     version = tomllib.loads((REPOSITORY / MANIFEST).read_text(encoding="utf-8"))["version"]
@@ -122,13 +122,13 @@ def build(platform: str, folder: Path, extra_pythons: list[str]) -> Path:
 
 
 def read_pins() -> list[Wheel]:
-    """All wheels of the pins."""
+    """All pinned wheels."""
     lines = PINS.read_text(encoding="utf-8").splitlines()
     return [Wheel(file, sha256) for sha256, file in (line.split() for line in lines if line and line[0] != "#")]
 
 
 def chosen(pins: list[Wheel], platform: str, extra_pythons: list[str]) -> list[Wheel]:
-    """The wheels for one platform's Pythons; raises BuildError where one of these would have no scipy."""
+    """The wheels for one platform's Python versions; raises BuildError if one of these would have no scipy."""
     pythons = [*PLATFORMS[platform][1], *extra_pythons]
     for python in pythons:
         if not any(wheel.parts[0] == _REQUIRED and wheel.serves(platform, python) for wheel in pins):
@@ -137,7 +137,7 @@ def chosen(pins: list[Wheel], platform: str, extra_pythons: list[str]) -> list[W
 
 
 def fetch(wheel: Wheel) -> Path:
-    """The wheel in the cache, downloaded where it is not there yet; raises BuildError where that fails."""
+    """Path of the wheel in the cache, downloaded if necessary; raises BuildError if that fails."""
     path = CACHE / wheel.file
     if not path.exists():
         package, version, python, abi, platform = wheel.parts
@@ -160,7 +160,7 @@ def fetch(wheel: Wheel) -> Path:
 
 
 def write(path: Path, platform: str, wheels: list[Path]) -> None:
-    """Write the package: the add-on's files at its top, the wheels, and everybody's licences."""
+    """Write the package: the add-on's files at the top level, the wheels, and all licenses."""
     code = REPOSITORY / "qc3d_addon"
     sources = sorted(file for file in code.rglob("*") if file.is_file() and "__pycache__" not in file.parts)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -177,7 +177,7 @@ def write(path: Path, platform: str, wheels: list[Path]) -> None:
 
 
 def manifest(platform: str, wheels: list[str]) -> str:
-    """The project's manifest with the platform and the wheels put before its first table."""
+    """The project's manifest, with the platform and the wheels inserted before its first table."""
     text = (REPOSITORY / MANIFEST).read_text(encoding="utf-8")
     listed = "".join(f'    "./wheels/{wheel}",\n' for wheel in wheels)
     added = f'platforms = ["{platform}"]\nwheels = [\n{listed}]\n'
@@ -187,7 +187,7 @@ def manifest(platform: str, wheels: list[str]) -> str:
 
 
 def licence_texts(wheel: Path) -> dict[str, bytes]:
-    """Every licence text inside a wheel by its path there; raises BuildError where there is none."""
+    """All license texts inside a wheel, by their paths; raises BuildError if there is none."""
     with zipfile.ZipFile(wheel) as archive:
         paths = [PurePosixPath(name) for name in archive.namelist() if not name.endswith((".py", "/"))]
         found = [path for path in paths if _LICENCE_NAME.match(path.name) or "licenses" in path.parts]
@@ -197,7 +197,7 @@ def licence_texts(wheel: Path) -> dict[str, bytes]:
 
 
 def check(path: Path, platform: str, wheels: list[Wheel]) -> None:
-    """Compare a package with what it should hold; raises BuildError where anything is missing."""
+    """Compare a package with what it should contain; raises BuildError if anything differs."""
     expected = {f"wheels/{wheel.file}": wheel.sha256 for wheel in wheels}
     with zipfile.ZipFile(path) as archive:
         broken = archive.testzip()
@@ -220,7 +220,7 @@ def check(path: Path, platform: str, wheels: list[Wheel]) -> None:
 
 
 def validate(path: Path) -> None:
-    """Let Blender's own validator, with its list of tags, judge the package; raises BuildError with what it says."""
+    """Check the package with Blender's own validator and list of tags; raises BuildError with its message."""
     spec = importlib.util.find_spec("bpy")
     scripts = list(Path(spec.origin).parent.glob("*/scripts")) if spec and spec.origin else []
     if not scripts:
@@ -239,7 +239,7 @@ def _licence_folder(wheel: str) -> str:
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
-    """Add a file with a fixed date, so that the same content makes the same package."""
+    """Add a file with a fixed date, so that equal content makes equal packages."""
     entry = zipfile.ZipInfo(name, (2026, 1, 1, 0, 0, 0))
     entry.external_attr = 0o644 << 16
     archive.writestr(entry, content, method)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw in-betweens side by side: first key, in-betweens, second key, one row for each file.
+"""Draw in-betweens side by side: the first key, the in-betweens, the second key, one row for each file.
 
-A file is a baked .blend (then --object, --from and --to say what to draw) or the FRAMES.npz of ``qc3d interpolate``.
-All rows show the same two keys, through the same camera.
+A file is a baked .blend, with --object, --from and --to to say what to draw, or the FRAMES.npz of ``qc3d interpolate``.
+All rows show the same two keys through the same camera. A name that ends in .gif makes a moving picture instead, with
+the rows beside each other.
 
     python tools/contact_sheet.py "QC3D, linear=demo/limb.blend" --object Arm --from Basis --to "Bend 90" \\
         --straight --output sheet.png
@@ -20,11 +21,11 @@ from qc3d_addon.solver.errors import InputError, QC3DError
 from qc3d_addon.solver.files.atomic import replacing, require_writable
 from qc3d_addon.solver.files.npz import open_archive, require_file
 from qc3d_paper.drawing.shading import VIEWS, Floats, Ints
-from qc3d_paper.drawing.sheets import Row, save_sheet, straight_blend
+from qc3d_paper.drawing.sheets import Row, save_animation, save_sheet, straight_blend
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Read the rows and write the picture; SystemExit with one sentence where that cannot be done."""
+    """Read the rows and write the picture; SystemExit with one sentence if that is impossible."""
     try:
         _draw(_arguments(argv))
     except QC3DError as error:
@@ -44,13 +45,13 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--view", choices=["auto", *VIEWS], default="auto")
     parser.add_argument("--up", choices=["y", "z"], default="z", help="the axis that points up (default: z)")
     parser.add_argument("--height", type=int, default=220, metavar="PIXELS", help="of one row (default: 220)")
-    parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png")
+    parser.add_argument("--output", type=Path, required=True, metavar="SHEET.png|.gif")
     return parser.parse_args(argv)
 
 
 def _draw(arguments: argparse.Namespace) -> None:
-    if arguments.output.suffix != ".png":
-        raise InputError(f"{arguments.output} is no picture that can be drawn; give a name that ends in .png.")
+    if arguments.output.suffix not in (".png", ".gif"):
+        raise InputError(f"{arguments.output} is not a picture that can be drawn; give a name ending in .png or .gif.")
     require_writable(arguments.output, inputs=[_path(row) for row in arguments.rows])
     rows = [_read(row, arguments) for row in arguments.rows]
     rows = [row._replace(times=row.times[:: arguments.every], frames=row.frames[:: arguments.every]) for row in rows]
@@ -61,8 +62,11 @@ def _draw(arguments: argparse.Namespace) -> None:
         rows = [row.with_scenery(*scenery) for row in rows]
     if arguments.up == "y":
         rows = [row._replace(frames=row.frames[..., [0, 2, 1]] * (1.0, -1.0, 1.0)) for row in rows]
+    if arguments.output.suffix == ".gif" and len({len(row.times) for row in rows}) > 1:
+        raise InputError("The files have different numbers of frames; a moving picture needs equally many.")
     with replacing(arguments.output) as unfinished:
-        save_sheet(rows, arguments.view, arguments.height, unfinished)
+        save = save_animation if arguments.output.suffix == ".gif" else save_sheet
+        save(rows, arguments.view, arguments.height, unfinished)
 
 
 def _path(row: str) -> Path:
@@ -86,10 +90,11 @@ def _read(text: str, arguments: argparse.Namespace) -> Row:
 
 
 def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> Row:
-    """The user's own keys and the in-betweens that were baked between them."""
+    """The row of a chain in a .blend file: the user's own keys and the in-betweens baked between them."""
     import bpy
 
-    from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
+    from qc3d_addon.blender.keys.chain_shapes import step_shapes
+    from qc3d_addon.blender.store.mesh_data import triangles
     from qc3d_addon.blender.store.records import Record
 
     require_file(path)
@@ -99,18 +104,16 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
         raise InputError(f"{path} cannot be opened; it must be a .blend file this Blender can read.") from error
     obj = bpy.data.objects.get(name)
     keys = getattr(obj and obj.data, "shape_keys", None)
-    chain = None if keys is None else Record.read(keys).chain(through)
+    chains = [] if keys is None else Record.read(keys).chains
+    chain = next((chain for chain in chains if chain.through == through), None)
     if chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
-    stride = chain.intervals // (len(through) - 1)
-    keys = chain.keys | {number * stride: key for number, key in enumerate(through)}
-    steps = sorted(keys)
-    frames = np.stack([key_coordinates(obj, keys[step]) for step in steps]).astype(np.float64)
-    return Row(label, triangles(obj.data).astype(np.int64), np.array(steps) / chain.intervals, frames)
+    frames = step_shapes(obj, chain)
+    return Row(label, triangles(obj.data).astype(np.int64), np.array(chain.places), frames)
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:
-    """Positions and triangles of a mesh in the file that was read last, in the scene's coordinates."""
+    """Vertices and triangles of a mesh in the .blend that was opened last, in world coordinates."""
     import bpy
 
     from qc3d_addon.blender.store.mesh_data import triangles

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw the packages by floor, with an arrow for every import between two of them::
+"""Draw the packages by floor, with an arrow wherever one imports another::
 
     python tools/draw_packages.py [docs/develop/packages.png]
 
-The floors are those of tests/test_layering.py, the arrows those of the code.
+The floors come from tests/test_layering.py, the arrows from the code.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY))
 from tests.test_layering import SOLVER_FLOORS, imports_of, modules  # noqa: E402
 
-# Above the solver: each on a floor of its own.
+# Packages above the solver, each on a floor of its own.
 ABOVE = ("worker", "blender", "cli")
-# Safe for the color-blind (Okabe & Ito 2008), one for each floor in turn.
+# A palette safe for color-blind readers (Okabe & Ito 2008), one color for each floor in turn.
 _COLORS = ("#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#D55E00", "#0072B2")
 _DARK = {"#0072B2", "#D55E00", "#009E73"}
 _WIDTH, _HEIGHT = 1.6, 0.62
-# What everybody imports: arrows to these would hide all others.
+# Imported from everywhere: arrows to these would hide all others.
 _COMMON = {"arrays", "errors", "settings"}
 
 
 def imports(repository: Path) -> tuple[Counter[str], Counter[tuple[str, str]]]:
-    """How many modules each room has, and how many imports lead from one room to another."""
+    """Number of modules in each package, and of imports from one package to another."""
     sizes: Counter[str] = Counter()
     arrows: Counter[tuple[str, str]] = Counter()
     for name, is_package, source in modules(repository):
@@ -59,7 +59,7 @@ def _room(name: str) -> str | None:
 
 
 def draw(path: Path) -> None:
-    """Write the picture."""
+    """Write the picture to ``path``."""
     sizes, arrows = imports(REPOSITORY)
     floors = [*SOLVER_FLOORS, *((room,) for room in ABOVE)]
     places = {}

@@ -4,22 +4,22 @@
 
 M. Alexa, D. Cohen-Or, D. Levin: As-rigid-as-possible shape interpolation. SIGGRAPH 2000.
 
-What is done, in this order:
+The steps:
 
-1. The second key is aligned to the first by the best rigid motion.
-2. The first key is filled with tetrahedra whose corners are all the surface's vertices and samples of the interior
+1. Align the second key to the first by the best rigid motion.
+2. Fill the first key with tetrahedra whose corners are the surface's vertices and samples of its interior
    (``interior.fill``).
-3. The samples' places in the second key, which the surface does not tell, minimise the as-rigid-as-possible energy
-   with the surface held (O. Sorkine, M. Alexa: As-rigid-as-possible surface modeling. SGP 2007; here on tetrahedra),
-   starting from the harmonic one.
-4. Each tetrahedron's gradient is split into rotation and stretch; the rotation is interpolated by its angle (always the
-   short way round), the stretch linearly; the shape with the nearest gradients, weighted by the first key's
-   volumes, solves a Poisson equation. Nothing is pinned; each connected part is placed so that its mean lies on the
-   straight path of its means.
-5. The share t of the rigid motion is put back.
+3. The positions of the samples in the second key are unknown. They minimize the as-rigid-as-possible energy for fixed
+   surface vertices (O. Sorkine, M. Alexa: As-rigid-as-possible surface modeling. SGP 2007; here on tetrahedra),
+   starting from the harmonic solution.
+4. Split each tetrahedron's gradient into rotation and stretch. Interpolate the rotation by its angle, always the short
+   way round, and the stretch linearly. Solve a Poisson equation for the shape whose gradients are closest to these,
+   weighted by the volumes in the first key. No vertex is fixed; each component is placed so that its mean moves along
+   a straight line.
+5. Put back the fraction t of the rigid motion.
 
-The method is made for closed surfaces. An open one has no certain inside: the tetrahedra there are those in which the
-generalised winding number exceeds one half, and vertices that belong to none follow the straight path.
+The method is meant for closed surfaces; an open one has no well-defined inside. There, the tetrahedra are those in
+which the generalized winding number exceeds one half, and vertices without a tetrahedron move along straight lines.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from numpy.typing import ArrayLike
 from . import interior
 from .gradients import Floats, GradientPath, Ints, LeastSquares, RigidMotion, factorised, rotations_nearest
 
-SWEEPS = 40  # of the search for the samples' places in the second key
+SWEEPS = 40  # local/global iterations for the samples' positions in the second key
 
 
 def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> tuple[Floats, dict[str, int]]:
-    """In-betweens (k, n, 3), and how many tetrahedra, folded ones in the second key and loose vertices there are."""
+    """In-betweens (k, n, 3), and the numbers of tetrahedra, of folded ones in the second key, of loose vertices."""
     motion = RigidMotion.between(key0, key1)
     target = motion.undo(key1)
     points, tetrahedra = interior.fill(key0, faces)
@@ -64,7 +64,7 @@ def system_of(points: Floats, tetrahedra: Ints) -> LeastSquares:
 
 
 def place_samples(system: LeastSquares, points: Floats, surface: Floats) -> Floats:
-    """Points of the second key: the given surface first, then the samples where the interior is most rigid."""
+    """Points of the second key: the given surface, then the samples where they minimize the energy."""
     held = len(surface)
     if held == len(points):
         return surface

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What both classical methods share: split each element's gradient, interpolate it, and gather it by least squares.
+"""Gradient-domain interpolation, shared by both classical methods.
 
-A method describes its elements by the constant gradients of their hat functions and by a weight; the shape whose
-gradients come nearest to the interpolated ones then solves one Poisson equation, whose matrix is the same in every
-frame.
+Each element's gradient is split and interpolated; the shape whose gradients are closest to the result in the
+least-squares sense solves a Poisson equation, whose matrix is the same for all frames.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ Ints = NDArray[np.int64]
 
 
 def rotations_nearest(matrices: Floats) -> Floats:
-    """The proper rotation (m, 3, 3) nearest to each matrix; a reflection goes into the smallest singular value."""
+    """The rotation (m, 3, 3) closest to each matrix; for a reflection, the smallest singular value is negated."""
     left, _, right = np.linalg.svd(matrices)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     return np.asarray(left @ right)
@@ -32,7 +31,7 @@ def rotations_nearest(matrices: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """x -> rotation x + shift, the motion that brings the first key nearest to the second (Kabsch 1976)."""
+    """The rigid motion that carries the first key closest to the second (Kabsch 1976)."""
 
     rotation: Rotation
     centre0: Floats
@@ -40,17 +39,17 @@ class RigidMotion:
 
     @classmethod
     def between(cls, key0: Floats, key1: Floats) -> RigidMotion:
-        """The best motion in the sense of least squares over the vertices."""
+        """The best motion by least squares over the vertices."""
         centre0, centre1 = key0.mean(axis=0), key1.mean(axis=0)
         covariance = (key1 - centre1).T @ (key0 - centre0)
         return cls(Rotation.from_matrix(rotations_nearest(covariance[None])[0]), centre0, centre1)
 
     def undo(self, key1: Floats) -> Floats:
-        """The second key moved onto the first one."""
+        """The second key moved by the inverse of the motion."""
         return np.asarray(self.rotation.inv().apply(key1 - self.centre1) + self.centre0)
 
     def apply(self, shape: Floats, time: float) -> Floats:
-        """Carry a shape along by the share ``time`` of the motion: the rotation by angle, the centre straight."""
+        """Move a shape by the fraction ``time`` of the motion: a fraction of the angle, and the center in a line."""
         part = Rotation.from_rotvec(time * self.rotation.as_rotvec())
         centre = (1.0 - time) * self.centre0 + time * self.centre1
         return np.asarray(part.apply(shape - self.centre0) + centre)
@@ -72,7 +71,7 @@ class GradientPath:
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Shapes from prescribed gradients: minimises the sum over elements of weight |gradient - prescribed|².
+    """Shapes from prescribed gradients: minimizes the sum over elements of weight |gradient - prescribed|².
 
     Parameters
     ----------
@@ -128,10 +127,10 @@ class LeastSquares:
         return factorised(self.matrix[self._free][:, self._free])
 
     def shape(self, gradients: Floats, centres_like: Floats) -> Floats:
-        """Points (count, 3) with gradients nearest to those given, each component centred where it is in another shape.
+        """Points (count, 3) with gradients closest to those given, each component centered as in another shape.
 
-        One point of each component is held while solving, which leaves the shape as it is, because the equations
-        leave a translation of every component free.
+        The equations leave the translation of every component undetermined, so one point of each is fixed while
+        solving.
         """
         solution = np.zeros((self.count, 3))
         solution[self._free] = self._factor.solve(self.divergence(gradients)[self._free])

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Interior tetrahedra that contain every vertex of a surface.
 
-The Delaunay tetrahedra of the surface's vertices and of samples of the interior, as far as they lie inside. They need
-not contain the surface's triangles (which as-rigid-as-possible interpolation never asks for), so a surface that
-crosses itself or has slits is no obstacle, as it would be for a constrained tetrahedralisation.
+These are the Delaunay tetrahedra, of the surface's vertices and samples of its interior, that lie inside. They need not
+contain the surface's triangles, which as-rigid-as-possible interpolation never uses. So surfaces that cross themselves
+or have slits are no obstacle, as they would be for a constrained tetrahedralization.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .gradients import Floats, Ints
 def fill(positions: Floats, faces: Ints) -> tuple[Floats, Ints]:
     """Points (the surface's vertices first, then samples) and positively oriented tetrahedra inside the surface.
 
-    A vertex that no inner tetrahedron touches gets the one of its tetrahedra that is deepest inside, if any of them is
-    inside by a quarter at least; else it stays loose.
+    A vertex without an inner tetrahedron gets the deepest of its tetrahedra, if the winding number there is at least
+    one quarter; otherwise it stays loose.
     """
     points = np.concatenate([positions, interior_samples(positions, faces)])
     tetrahedra = Delaunay(points).simplices.astype(np.int64)
@@ -31,7 +31,7 @@ def fill(positions: Floats, faces: Ints) -> tuple[Floats, Ints]:
     tetrahedra[backward] = tetrahedra[backward][:, [0, 2, 1, 3]]
     pairs = [(a, b) for a in range(4) for b in range(a)]
     longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs], axis=0)
-    solid = np.abs(volumes) > 1e-4 * longest**3  # what is flatter is a sliver between points of one plane or sphere
+    solid = np.abs(volumes) > 1e-4 * longest**3  # flatter ones are slivers of almost coplanar or cospherical points
     tetrahedra, corners = tetrahedra[solid], corners[solid]
     winding = winding_numbers(corners.mean(axis=1), positions, faces)
     inside = winding > 0.5
@@ -45,7 +45,7 @@ def fill(positions: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 
 def interior_samples(positions: Floats, faces: Ints, seed: int = 0) -> Floats:
-    """Jittered points of a body-centred lattice inside the surface, about as many as it has vertices."""
+    """Jittered points of a body-centered lattice inside the surface, about as many as it has vertices."""
     a, b, c = positions[faces.T] - positions.mean(axis=0)
     volume = abs(float((a * np.cross(b, c)).sum())) / 6.0
     spacing = (2.0 * volume / len(positions)) ** (1.0 / 3.0)
@@ -60,12 +60,12 @@ def interior_samples(positions: Floats, faces: Ints, seed: int = 0) -> Floats:
 
 
 def winding_numbers(queries: Floats, positions: Floats, faces: Ints, sizes: tuple[int, ...] = (8, 32, 128)) -> Floats:
-    """Generalised winding number (q,) of each query point.
+    """Generalized winding number (q,) of each query point.
 
     A. Jacobson, L. Kavan, O. Sorkine: Robust inside-outside segmentation using generalized winding numbers. 2013. The
-    triangles are gathered in the cells of a coarse grid, those in the cells of finer ones (``sizes`` counts the
-    cells along the longest side); a cell that is far away acts as one dipole (G. Barill et al.: Fast winding
-    numbers for soups and clouds. 2018), a near one is opened.
+    triangles are clustered in the cells of nested grids, with ``sizes`` cells along the longest side. A cell that is
+    far away acts as one dipole (G. Barill et al.: Fast winding numbers for soups and clouds. 2018); a close one is
+    replaced by what it contains.
     """
     levels = Level.nested(positions[faces], sizes)
     total = np.zeros(len(queries))
@@ -88,7 +88,7 @@ def winding_numbers(queries: Floats, positions: Floats, faces: Ints, sizes: tupl
 
 
 class Level(NamedTuple):
-    """Cells of triangles: the cells' middles, dipoles and reach, and what each of them opens into."""
+    """The cells of one grid: their centers, dipoles and radii, and the cells or triangles that each contains."""
 
     middles: Floats
     dipoles: Floats

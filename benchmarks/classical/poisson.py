@@ -4,16 +4,16 @@
 
 D. Xu, H. Zhang, Q. Wang, H. Bao: Poisson shape interpolation. SPM 2005.
 
-What is done, in this order:
+The steps:
 
-1. The second key is aligned to the first by the best rigid motion.
-2. Each triangle's deformation gradient, with the unit normal as third direction, is split into rotation and stretch;
-   the rotation is interpolated by its angle (always the short way round), the stretch linearly.
-3. The surface whose gradients are nearest to these, weighted by the first key's areas, solves a Poisson equation.
-   Nothing is pinned; each connected part is placed so that its mean vertex lies on the straight path of its means.
-4. The share t of the rigid motion is put back.
+1. Align the second key to the first by the best rigid motion.
+2. Split each triangle's deformation gradient, completed by the unit normals, into rotation and stretch. Interpolate the
+   rotation by its angle, always the short way round, and the stretch linearly.
+3. Solve a Poisson equation for the surface whose gradients are closest to these, weighted by the areas in the first
+   key. No vertex is fixed; each component is placed so that its mean moves along a straight line.
+4. Put back the fraction t of the rigid motion.
 
-Triangles without area in the first key carry no weight. Vertices without a triangle follow the straight path.
+Triangles without area in the first key have no weight. Vertices without a triangle move along straight lines.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> Floats:
 
 
 def frames_of_triangles(positions: Floats, faces: Ints) -> Floats:
-    """Two edges and the unit normal of each triangle as the columns of (m, 3, 3); no area, no normal."""
+    """(m, 3, 3) two edges and the unit normal of each triangle in columns; the normal is zero without an area."""
     a, b, c = positions[faces.T]
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -19,12 +19,13 @@ from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
 from . import compat
-from .keys import shape_keys, slider
+from .keys import chain_keys, shape_keys
 from .store.mesh_data import key_coordinates, set_key_coordinates
 from .store.records import Chain, Record
 
 if TYPE_CHECKING:
     from ..solver.frames.preview import PreviewCurve
+    from ..solver.frames.weights import Weights
     from .bake.plan import Plan
 
 KEY = "QC3D Preview"
@@ -36,6 +37,7 @@ class _Scrub:
 
     plan: Plan  # finds the object, and knows the keys that the curve was made from
     chain: Chain
+    weights: Weights
     curve: PreviewCurve
     place: float | None = None  # where the slider was when the key was last set
     was_edited: bool = False
@@ -60,10 +62,10 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
         If the object of the plan is gone or was changed meanwhile, or the slider is not a number; it is as it was.
     """
     obj = plan.find_object()
-    slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
-    shape_keys.restart_drivers(obj.data.shape_keys, chain)
+    chain_keys.control_of(obj, chain).require()
+    chain_keys.restart_drivers(obj.data.shape_keys, chain)
     end()
-    _show(obj, _Scrub(plan, chain, curve))
+    _show(obj, _Scrub(plan, chain, chain.weights, curve))
 
 
 def end() -> None:
@@ -82,7 +84,7 @@ def _show_again(scrub: _Scrub) -> None:
         obj = scrub.plan.find_object()
         chain = Record.read(obj.data.shape_keys).chain_of_slider(scrub.chain.slider)
         if chain is not None:  # undo may have brought back another number of steps
-            _show(obj, replace(scrub, chain=chain))
+            _show(obj, replace(scrub, chain=chain, weights=chain.weights))
 
 
 def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
@@ -110,17 +112,16 @@ def _follow(scrub: _Scrub) -> None:
     if obj.data.is_editmode:
         scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
         return
-    owner = shape_keys.slider_owner(obj, scrub.chain)
+    control = chain_keys.control_of(obj, scrub.chain)
     is_whole = len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
-    is_playable = slider.problem(owner, scrub.chain.slider) is None
-    if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or not is_playable:
+    if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or control.problem is not None:
         end()
         return
-    place = float(owner[scrub.chain.slider])
+    place = control.value
     if place != scrub.place and not key.mute:
         scrub.place = place
         basis = key_coordinates(obj, keys.reference_key.name)
-        set_key_coordinates(key, basis + scrub.curve.beyond_blend(place, scrub.chain.intervals))
+        set_key_coordinates(key, basis + scrub.curve.beyond(place, scrub.weights))
         keys.update_tag()
 
 

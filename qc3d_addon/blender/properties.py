@@ -12,7 +12,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 from .bake.request import BakeRequest
 from .heat_map import heat_map
 from .heat_map.colors import MEASURE_ITEMS
@@ -41,15 +41,19 @@ _DESCRIPTIONS = {
         "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",
         "delaunay": "Delaunay tetrahedra of graded samples; quick, repeatable, runs everywhere",
     },
+    "weights": {
+        "smooth": "A smooth path through the in-betweens: a few of them play the whole motion",
+        "hats": "Straight blends from each in-between to the next",
+    },
     "quality": {
         "normal": "All that in-betweens need",
         "fine": "Four times as many tetrahedra: finer heat maps of volume and dilatation, mode Linear",
         "finest": "As fine as it gets; slow",
     },
 }
-_OPTIONS = (FitOptions, FrameOptions)
+_OPTIONS = (FitOptions, FrameOptions, PlayOptions)
 _DEFAULTS = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
-_KINDS = get_type_hints(FitOptions) | get_type_hints(FrameOptions)
+_KINDS = {name: hint for kind in _OPTIONS for name, hint in get_type_hints(kind).items()}
 
 
 def _choice(setting: str, description: str) -> object:
@@ -107,7 +111,7 @@ class BakeChoices(MapChoices):
     count: IntProperty(
         name="In-Betweens",
         description="Number of in-betweens between every two keys, evenly spaced",
-        default=3,
+        default=5,
         min=1,
         max=MAX_STEPS - 1,
         soft_max=20,
@@ -115,7 +119,7 @@ class BakeChoices(MapChoices):
     )
     use_tolerance: BoolProperty(
         name="As Few as Needed",
-        description="Make as few in-betweens as stay within a tolerance, instead of a fixed number",
+        description="Make as few in-betweens as stay within a tolerance, where they help, instead of a fixed number",
         default=False,
         options={'SKIP_SAVE'},
     )
@@ -132,9 +136,21 @@ class BakeChoices(MapChoices):
         unit='LENGTH',
         options={'SKIP_SAVE'},
     )
+    weights: _choice("weights", "What is played between the in-betweens")
     colliders: StringProperty(
         name="Keep Off",
         description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
+        options={'SKIP_SAVE'},
+    )
+    play_on: EnumProperty(
+        name="Play On",
+        description="What plays the in-betweens",
+        items=[
+            ("auto", "Auto", "The last key's own value where it can be, else a slider"),
+            ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
+            ("slider", "Slider", "A slider of their own, a custom property of the object"),
+        ],
+        default="auto",
         options={'SKIP_SAVE'},
     )
     mode: _choice("mode", "How the map between the keys is interpolated")
@@ -213,14 +229,16 @@ def fit_options(choices: MapChoices) -> FitOptions:
     return FitOptions(**{name: getattr(choices, name) for name in names})
 
 
-def bake_request(choices: BakeChoices) -> BakeRequest:
-    """The choices as a request; raises InputError where they do not fit together."""
+def bake_request(choices: BakeChoices, keys: tuple[str, ...] | None = None) -> BakeRequest:
+    """The choices as a request, for their own keys or others; raises InputError where they do not fit together."""
     return BakeRequest(
-        keys=key_names(choices),
+        keys=key_names(choices) if keys is None else keys,
         count=choices.count,
         fit_options=fit_options(choices),
         frame_options=FrameOptions(choices.mode, choices.easing),
         keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
         tolerance=choices.tolerance if choices.use_tolerance else 0.0,
+        weights=choices.weights,
+        play_on=choices.play_on,
         colliders=choices.colliders,
     )

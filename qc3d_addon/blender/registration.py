@@ -11,6 +11,7 @@ from . import cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -25,7 +26,7 @@ from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_ke
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
-from .ui import panel_results, panels, presets
+from .ui import menus, panel_results, panels, presets
 
 CLASSES = (
     properties.InnerKey,  # before what has it
@@ -33,6 +34,8 @@ CLASSES = (
     QC3D_OT_prepare,
     preferences.QC3DPreferences,
     QC3D_OT_bake_inbetweens,
+    KeyChoice,
+    QC3D_OT_bake_keys,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
@@ -63,6 +66,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
     jobs.register()
+    menus.register()
     legend.register()
     live_scrub.register()
     _commands.extend(compat.register_command("qc3d", cli.run_command))
@@ -74,6 +78,7 @@ def unregister() -> None:
         compat.unregister_command(_commands.pop())
     live_scrub.unregister()
     legend.unregister()
+    menus.unregister()
     jobs.unregister()
     engines.forget()
     del bpy.types.Object.qc3d

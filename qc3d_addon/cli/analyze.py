@@ -8,7 +8,7 @@ import argparse
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..solver.errors import InputError
 from ..solver.files.atomic import making_folder, replacing_all, require_writable_in
@@ -21,7 +21,8 @@ from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, put_tets, 
 from ..solver.maps.mapping import Mapping
 from ..solver.settings import FitOptions
 from ..solver.support.progress import finish
-from .options import add_options, fit_options, write_json
+from . import speech
+from .options import add_options, fit_options, print_notes, write_json
 from .progress_bars import StageBars
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("--to", dest="last", metavar="NAME", help="the second")
     command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
     command.add_argument("--format", choices=("npz", "vtu", "vtk", "msh"), default="npz", help="of mapping.* (npz)")
+    command.add_argument(
+        "--up", choices=("x", "y", "z"), default="z", help="the axis that points up in pictures of shapes (z)"
+    )
     command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
     add_options(command, FitOptions)
     command.set_defaults(run=_run)
@@ -66,13 +70,25 @@ def _run(arguments: argparse.Namespace) -> None:
             fitted = finish(fit_pair(pair, options), bars)
         mapping = Mapping(fitted.mesh, fitted.mapped)
     else:
-        mapping = read_tets(arguments.input).mapping(None if arguments.target is None else read_tets(arguments.target))
+        content = read_tets(arguments.input)
+        print_notes(content.notes)
+        mapping = content.mapping(None if arguments.target is None else read_tets(arguments.target))
     analysis = Analysis(mapping)
     with making_folder(arguments.output):
-        _write(analysis, fitted, [arguments.output / name for name in names])
+        _write(analysis, fitted, [arguments.output / name for name in names], arguments.up)
+    _say(analysis.summary(), arguments.output)
 
 
-def _write(analysis: Analysis, fitted: FittedMap | None, paths: list[Path]) -> None:
+def _say(summary: dict[str, Any], folder: Path) -> None:
+    ratio, dilatation = summary["volume_ratio"], summary["dilatation"]
+    largest = "infinite" if dilatation["largest"] is None else f"{dilatation['largest']:.3g}"
+    speech.say(
+        f"{summary['tetrahedra']} tetrahedra, {summary['folds']} folds; volume ratio {ratio['smallest']:.3g} to "
+        f"{ratio['largest']:.3g}, dilatation {dilatation['median']:.3g} in the middle and at most {largest}; {folder}"
+    )
+
+
+def _write(analysis: Analysis, fitted: FittedMap | None, paths: list[Path], up: str) -> None:
     from qc3d_paper.drawing.slices import save_histograms, save_slices
     from qc3d_paper.drawing.surfaces import save_distortion
 
@@ -90,7 +106,7 @@ def _write(analysis: Analysis, fitted: FittedMap | None, paths: list[Path]) -> N
                 **{name: {"smallest": float(v.min()), "largest": float(v.max())} for name, v in measures.items()},
             }
             write_arrays(surface[0], {"faces": pair.faces, "key0": pair.key0, "key1": pair.key1, **measures})
-            save_distortion(pair, measures, surface[1])
+            save_distortion(pair, measures, surface[1], up)
         write_json(text, summary)
 
 

@@ -21,11 +21,11 @@ from ..solver.files.atomic import replacing, replacing_all, require_writable
 from ..solver.files.npz import open_archive, write_arrays
 from ..solver.keys.keypair import KeyPair
 from ..solver.maps.boundary_conditions import Conditions
-from ..solver.maps.files import TARGET, TetFile, read_tets, write_tets
+from ..solver.maps.files import TARGET, TetFile, read_tets, require_format, write_tets
 from ..solver.maps.mapping import Mapping
 from ..solver.support.memory import require_memory_for_frames
 from . import speech
-from .options import output_files, whole_number, write_json
+from .options import output_files, print_notes, whole_number, write_json
 
 _MODES = 300
 
@@ -103,7 +103,9 @@ def _decompress(arguments: argparse.Namespace) -> None:
         with replacing(arguments.output) as unfinished:
             write_arrays(unfinished, {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]})
         return
+    require_format(arguments.output)
     content = read_tets(arguments.mesh)
+    print_notes(content.notes)
     mesh = content.mesh()
     stored = read_compressed(arguments.file, Source("maps", mesh.points, mesh.tets))
     codec = Codec(mesh, stored.modes, stored.compressed.scheme, stored.compressed.boundary)
@@ -115,7 +117,9 @@ def _decompress(arguments: argparse.Namespace) -> None:
 
 
 def _maps_job(arguments: argparse.Namespace) -> _Job:
-    mappings = _mappings(read_tets(arguments.map), arguments.target)
+    content = read_tets(arguments.map)
+    print_notes(content.notes)
+    mappings = _mappings(content, arguments.target)
     mesh = mappings[0].mesh
     modes = min(_MODES if arguments.modes is None else arguments.modes, len(mesh.points) - 2)
     codec = Codec(mesh, modes, arguments.scheme, arguments.boundary)

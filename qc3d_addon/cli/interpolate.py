@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import get_args
 
 from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.frames.bake import evenly_spaced
@@ -13,7 +14,7 @@ from ..solver.frames.files import write_frames
 from ..solver.frames.modes import needs_fits
 from ..solver.frames.task import Task, carry_out
 from ..solver.keys.files import read_pairs
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, Mirror
 from ..solver.support.progress import finish
 from .options import (
     add_keys,
@@ -32,9 +33,19 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command to the others."""
     command = commands.add_parser("interpolate", help="in-betweens of shapes in an .npz file")
     command.add_argument(
-        "pair", type=Path, metavar="PAIR.npz", help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3)"
+        "pair",
+        type=Path,
+        metavar="PAIR.npz",
+        help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3), polygons (m,) where known",
     )
     add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1")
+    command.add_argument(
+        "--mirror",
+        choices=get_args(Mirror),
+        default="auto",
+        help="axes across which the mesh is one half only; auto: where it is open on a plane through the origin "
+        "(default: auto)",
+    )
     add_options(command, FrameOptions, FitOptions)
     command.set_defaults(run=_run)
 
@@ -46,7 +57,12 @@ def _run(arguments: argparse.Namespace) -> None:
     times = evenly_spaced((arguments.frames + 1) * (len(names) - 1) - 1)
     fit, frame = fit_options(arguments), frame_options(arguments)
     pairs = read_pairs(
-        arguments.pair, names, frames=len(times), quality=fit.quality, needs_fits=needs_fits(frame.mode)
+        arguments.pair,
+        names,
+        frames=len(times),
+        quality=fit.quality,
+        needs_fits=needs_fits(frame.mode),
+        mirror=arguments.mirror,
     )
     task = Task(pairs, names, fit, frame, times)
     with StageBars() as bars:

@@ -9,10 +9,10 @@ import tomllib
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
-from . import analyze, bake, compress, interpolate, reconstruct, reproduce, speech
+from . import analyze, bake, combine, compress, interpolate, reconstruct, reproduce, speech
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    for command in (interpolate, bake, analyze, reconstruct, compress, reproduce):
+    for command in (interpolate, combine, bake, analyze, reconstruct, compress, reproduce):
         command.add_to(commands)
     return parser
 
@@ -73,7 +73,32 @@ def _version() -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one sentence; argparse alone would print the usage of the whole command before it."""
+    """Says what is wrong in one sentence; argparse alone would print the usage of the whole command before it.
+
+    An option that takes one value and comes twice is refused: argparse would silently drop the first.
+    """
+
+    def __init__(self, **choices: Any) -> None:  # noqa: ANN401 - whatever argparse takes
+        super().__init__(**choices)
+        for name in (None, "store"):
+            self.register("action", name, _Once)
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
+
+
+class _Once(argparse.Action):
+    """Stores the value of an option that may come once."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        given = vars(namespace).setdefault("given", set())
+        if option_string is not None and self.dest in given:
+            raise argparse.ArgumentError(self, "it is given twice; name it once")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from ..solver.errors import on_one_line
-from ..solver.settings import FitOptions, FrameOptions
+from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 from . import speech
 
 MOST_FRAMES = 10_000
 _HELP = {
     "mode": "how in-betweens are made",
     "easing": "how far along the way the in-betweens are",
+    "weights": "what is played between in-betweens",
     "stretch": "how mode natural interpolates stretches",
     "engine": "what fills the volume around the mesh",
     "quality": "how fine the volume is",
@@ -27,7 +28,7 @@ _HELP = {
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
 
-def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions]) -> None:
+def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions | PlayOptions]) -> None:
     """Add the solver's options: those of the fit, of the frames, or both."""
     for kind in kinds:
         defaults, types = kind(), get_type_hints(kind)
@@ -59,14 +60,26 @@ def _chosen(arguments: argparse.Namespace, kind: type[FitOptions | FrameOptions]
 
 def add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents: str) -> None:
     """Add the keys to go through, the number of in-betweens, and where results go."""
-    command.add_argument("--from", dest="first", required=True, metavar="NAME", help=f"the {kind} to start from")
+    add_way(command, kind)
+    command.add_argument(
+        "--frames", type=frame_count, required=True, metavar="N", help="number of in-betweens between every two"
+    )
+    add_outputs(command, output, contents)
+
+
+def add_way(command: argparse.ArgumentParser, kind: str, is_required: bool = True) -> None:
+    """Add the keys to go through."""
+    command.add_argument(
+        "--from", dest="first", required=is_required, metavar="NAME", help=f"the {kind} to start from"
+    )
     command.add_argument(
         "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; once for each, in order"
     )
-    command.add_argument("--to", dest="last", required=True, metavar="NAME", help=f"the {kind} to end with")
-    command.add_argument(
-        "--frames", type=_frame_count, required=True, metavar="N", help="number of in-betweens between every two"
-    )
+    command.add_argument("--to", dest="last", required=is_required, metavar="NAME", help=f"the {kind} to end with")
+
+
+def add_outputs(command: argparse.ArgumentParser, output: str, contents: str) -> None:
+    """Add where results go."""
     command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
     command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
 
@@ -100,7 +113,8 @@ def whole_number(text: str) -> int:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
 
 
-def _frame_count(text: str) -> int:
+def frame_count(text: str) -> int:
+    """A number of in-betweens; for argparse."""
     count = whole_number(text)
     if not 0 <= count <= MOST_FRAMES:
         raise argparse.ArgumentTypeError(f"{text} in-betweens are not possible; 0 to {MOST_FRAMES} are")

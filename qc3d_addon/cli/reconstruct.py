@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,19 +12,20 @@ import numpy as np
 
 from ..solver.errors import InputError
 from ..solver.files.atomic import require_writable
-from ..solver.files.npz import require_file, unreadable
 from ..solver.maps.boundary_conditions import Conditions
-from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
+from ..solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, require_format, write_tets
 from ..solver.maps.reconstruction import reconstruct
 from ..solver.maps.representation import from_eigen_form, from_upper_triangle
+from ..solver.numerics.rotations import determinants
 from . import speech
+from .landmarks import read_landmarks
+from .options import print_notes
 
 if TYPE_CHECKING:
     from ..solver.arrays import Floats
     from ..solver.tets.mesh import TetMesh
 
 _FORMS = {"upper-triangle": (STRETCH, from_upper_triangle), "eigen": (EIGEN_FORM, from_eigen_form)}
-_HEADER = ["vertex", "x", "y", "z"]
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -61,13 +61,21 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def _run(arguments: argparse.Namespace) -> None:
     require_writable(arguments.output, inputs=[arguments.mesh, arguments.landmarks])
+    require_format(arguments.output)
     content = read_tets(arguments.mesh)
+    print_notes(content.notes)
     mesh = content.mesh()
     conditions = _conditions(arguments, content, mesh)
     found = reconstruct(mesh, _stretch(arguments, content), conditions)
     write_tets(
         arguments.output,
         TetFile(mesh.points, mesh.tets, {**content.at_vertices, TARGET: found.values}, content.at_tets),
+    )
+    ratios = determinants(found.jacobians)
+    moved = np.linalg.norm(found.values - mesh.points, axis=1).max()
+    speech.say(
+        f"{len(mesh.tets)} tetrahedra rebuilt, {found.folds} folds; volume ratio {ratios.min():.3g} to "
+        f"{ratios.max():.3g}, vertices moved by up to {moved:.3g}; {arguments.output}"
     )
     if found.folds:
         speech.note(
@@ -78,10 +86,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
 def _stretch(arguments: argparse.Namespace, content: TetFile) -> Floats:
     name, matrices = _FORMS[arguments.form]
-    if name not in content.at_tets:
-        known = ", ".join(content.at_tets) or "none"
-        raise InputError(f"{arguments.mesh} has no array '{name}' of the tetrahedra; it has {known}.")
-    numbers = content.at_tets[name]
+    numbers = content.of_tets(name)
     if numbers.ndim != 2 or numbers.shape[1] != 6 or numbers.dtype.kind not in "fiu":
         raise InputError(f"The array '{name}' has the shape {numbers.shape}; each tetrahedron needs six numbers.")
     return matrices(numbers.astype(np.float64))
@@ -91,37 +96,11 @@ def _conditions(arguments: argparse.Namespace, content: TetFile, mesh: TetMesh) 
     if arguments.boundary == "sliding":
         conditions = Conditions.sliding_cube(mesh)
     elif arguments.boundary == "fixed":
-        given = content.mapping().values if TARGET in content.at_vertices else mesh.points
+        has_target = TARGET in content.at_vertices or TARGET in content.misfits
+        given = content.mapping().values if has_target else mesh.points
         conditions = Conditions.fixed_boundary(mesh, given)
     else:
         conditions = Conditions.none(mesh)
     if arguments.landmarks is None:
         return conditions
     return conditions.with_landmarks(*read_landmarks(arguments.landmarks))
-
-
-def read_landmarks(path: Path) -> tuple[list[int], list[list[float]]]:
-    """Vertices and their places, NaN where a coordinate is free, of a table; raises InputError where it is none."""
-    require_file(path)
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise unreadable(path, error) from error
-    if not rows or [cell.strip() for cell in rows[0]] != _HEADER:
-        raise InputError(f"{path} must begin with the row {','.join(_HEADER)}.")
-    vertices, values = [], []
-    for number, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
-        try:
-            vertex, *cells = row
-            vertices.append(int(vertex))
-            values.append([float(cell) if cell.strip() else np.nan for cell in cells])
-            if len(cells) != 3:
-                raise ValueError("four cells are needed")
-        except ValueError as error:
-            raise InputError(f"{path}, row {number}: {error}; correct the row.") from error
-    if not vertices:
-        raise InputError(f"{path} names no landmarks; give a row for each.")
-    return vertices, values

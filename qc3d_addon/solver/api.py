@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from . import steps
 from .arrays import Floats
 from .collision.colliders import Collider
+from .combinations.base import KeysOnBase
+from .combinations.combine import Combination
+from .combinations.verdicts import Verdict, verdicts
 from .errors import InputError, QC3DError
 from .fit.files import KeptMaps, read_maps, write_maps
 from .fit.fitted_map import FittedMap, Residual
@@ -23,20 +26,23 @@ from .frames.bake import Bake
 from .frames.chain import chain_frames
 from .frames.following import Following
 from .frames.modes import needs_fits
-from .keys.keypair import KeyPair
 from .maps.mapping import Mapping
-from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mode
+from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.progress import Progress, Steps, finish
 
 __all__ = [
     "Collider",
+    "Combination",
     "Fit",
     "FitOptions",
     "FrameOptions",
     "InputError",
     "QC3DError",
+    "Verdict",
     "bake",
+    "combine",
     "fit",
+    "judge_pairs",
     "load_fit",
     "steps",
 ]
@@ -127,6 +133,8 @@ def fit(
     faces: ArrayLike,
     edges: ArrayLike | None = None,
     *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Fit:
@@ -140,6 +148,11 @@ def fit(
         Triangles.
     edges : (e, 2), optional
         Edges to keep together that belong to no triangle.
+    polygons : (m,), optional
+        The polygon of each triangle; without it, two triangles that make a flat quad in all keys are one.
+    mirror
+        ``auto``: a mesh that is open on a plane through the origin, in all keys, is one half and moves with its mirror
+        image; its seam stays shut. ``none``, or the axes to mirror across, such as ``x`` or ``xy``.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -158,23 +171,33 @@ def fit(
     >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
     >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     >>> fit = qc3d.fit(corners, corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], faces)
-    >>> fit.inbetweens([0.5]).frames[0, 1].round(1)
-    array([0.7, 0.7, 0. ])
+    >>> fit.inbetweens([0.5]).frames[0, 1, :2].round(1)
+    array([0.7, 0.7])
     """
-    return Fit(steps.fit(key0, key1, faces, edges, **options).run(progress))
+    work = steps.fit(key0, key1, faces, edges, polygons=polygons, mirror=mirror, **options)
+    return Fit(work.run(progress))
 
 
 def load_fit(
-    path: str | os.PathLike[str], key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None
+    path: str | os.PathLike[str],
+    key0: ArrayLike,
+    key1: ArrayLike,
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
 ) -> Fit:
     """Read a fit of these keys from a file that ``Fit.save`` or Blender's *Save Map* wrote.
+
+    All but the path as for ``fit``.
 
     Raises
     ------
     InputError
         If the file cannot be read, or holds no fit of these keys.
     """
-    pair = KeyPair.checked(key0, key1, faces, edges)
+    pair = steps.one_pair(key0, key1, faces, edges, polygons, mirror)
     maps = read_maps(Path(path)).maps
     for number, data in enumerate(maps.values(), start=1):
         try:
@@ -191,6 +214,8 @@ def bake(
     frames: int | ArrayLike = 5,
     edges: ArrayLike | None = None,
     *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
     mode: Mode = "natural",
     easing: Easing = "linear",
     colliders: Sequence[Collider] = (),
@@ -203,7 +228,7 @@ def bake(
     ----------
     keys : sequence of (n, 3)
         Shapes of one mesh, from the first to the last; the same array may come again.
-    faces, edges
+    faces, edges, polygons, mirror
         See ``fit``.
     frames : int or (k,)
         The number of in-betweens between every two keys, the keys themselves beside them; or times, 0 the first key
@@ -230,5 +255,81 @@ def bake(
     >>> qc3d.bake([corners, 2.0 * corners, corners], faces, frames=1).frames.shape
     (5, 4, 3)
     """
-    work = steps.bake(keys, faces, frames, edges, mode=mode, easing=easing, colliders=colliders, **options)
+    work = steps.bake(
+        keys,
+        faces,
+        frames,
+        edges,
+        polygons=polygons,
+        mirror=mirror,
+        mode=mode,
+        easing=easing,
+        colliders=colliders,
+        **options,
+    )
     return work.run(progress)
+
+
+def combine(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    weights: Sequence[float] | None = None,
+    order: Sequence[int] | None = None,
+    progress: OnProgress | None = None,
+    **options: Unpack[FitChoices],
+) -> Combination:
+    """The shape with several keys of one base on at once.
+
+    Parameters
+    ----------
+    base : (n, 3)
+        The shape that the keys are relative to.
+    keys : sequence of (n, 3)
+        Two or more.
+    faces, edges
+        See ``fit``.
+    weights : sequence of float, optional
+        How much each key is on, 0..1; all fully where none are given. One that is partly on takes a fit.
+    order : sequence of int, optional
+        Numbers of the keys, the outermost first: a key's motion happens inside those before it. Where it is not given
+        it is found: the outer of two keys is the one that turns more where the other bends.
+    progress : callable
+        Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
+    **options
+        See ``FitOptions``.
+
+    Raises
+    ------
+    QC3DError
+        If the keys, weights, order or options cannot be used, the volume of a key that is partly on cannot be filled,
+        or memory would not do.
+    """
+    return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
+
+
+def judge_pairs(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    pairs: Sequence[tuple[int, int]] | None = None,
+) -> Iterator[Verdict]:
+    """For every two keys of one base, one after the other: is their sum right, or does it need a combination?
+
+    Parameters
+    ----------
+    base, keys, faces, edges
+        See ``combine``.
+    pairs : sequence of (int, int), optional
+        Numbers of the keys, where not every two are asked for.
+
+    Raises
+    ------
+    InputError
+        If the keys cannot be used.
+    """
+    return verdicts(KeysOnBase(base, keys, faces, edges), pairs)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Typed errors: what is wrong, and what to do about it, in one sentence a person can act on."""
+"""Typed errors: one sentence each, which says what is wrong and what to do about it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import errno
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-_LONGEST = 1000
+_LONGEST = 1000  # characters that a message may have
 
-# What to do where the system refuses, by the name of its error; not every system has every one.
+# Remedies for errors of the operating system, by their names; not every system has all of them.
 _REMEDIES_OF_LIMITS = {
     "EMFILE": "close some files or programs, or raise the limit on open files (ulimit -n)",
     "ENFILE": "close some files or programs, or raise the limit on open files (ulimit -n)",
@@ -30,7 +30,7 @@ _REMEDIES_OF_PLACES = {
 
 
 class QC3DError(Exception):
-    """Base of every error that QC3D raises on purpose; its text is meant for the user, on one line."""
+    """Base class of all errors that QC3D raises deliberately; their text is one line, meant for the user."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(on_one_line(sentence))
@@ -45,17 +45,18 @@ class MeshingError(QC3DError):
 
 
 class WorkerError(QC3DError):
-    """The process that does the work ended without a result."""
+    """The background process ended without a result."""
 
 
 class ReconstructionError(QC3DError):
-    """A map cannot be rebuilt from its representation and boundary conditions."""
+    """A map cannot be reconstructed from its representation and boundary conditions."""
 
 
 def on_one_line(text: str) -> str:
-    """Text that may hold names from files, as a terminal or Blender can show it: nothing that controls them.
+    """Text made safe for a terminal or Blender, since it may contain names from files.
 
-    What cannot be printed is written as Python writes it, such as ``\\n``; the middle of a very long text is left out.
+    Characters that cannot be printed are escaped as in Python, such as ``\\n``; the middle of a very long text is left
+    out.
     """
     shown = "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
     return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST // 2]} … {shown[-_LONGEST // 2 :]}"
@@ -63,7 +64,7 @@ def on_one_line(text: str) -> str:
 
 @contextmanager
 def naming_pair(first: str, second: str, chain: Sequence[str]) -> Iterator[None]:
-    """Put in front of an error's sentence which two keys of a chain of more it is about."""
+    """Context manager that names the pair of keys in front of an error's text, if the chain has several pairs."""
     try:
         yield
     except QC3DError as error:
@@ -73,18 +74,18 @@ def naming_pair(first: str, second: str, chain: Sequence[str]) -> Iterator[None]
 
 
 def reason(error: BaseException) -> str:
-    """What went wrong as a clause: the system's own words where there are some, on one line, without a full stop."""
+    """The cause of an error as a clause without a final period: the system's own words if there are any."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return " ".join(text.split()).rstrip(".") or type(error).__name__
 
 
 def remedy_of_limit(error: BaseException) -> str | None:
-    """What to do, as a clause, where a limit of the system was reached; None where the reason is another one."""
+    """A remedy as a clause, if a limit of the system was reached; None for any other cause."""
     return _remedy(error, _REMEDIES_OF_LIMITS)
 
 
 def with_remedy(error: OSError) -> str:
-    """As ``reason``, and what to do about it, where something was to be written or started."""
+    """As ``reason``, followed by a remedy if there is one; for errors while writing files or starting processes."""
     remedy = _remedy(error, _REMEDIES_OF_LIMITS | _REMEDIES_OF_PLACES)
     return reason(error) if remedy is None else f"{reason(error)}; {remedy}"
 

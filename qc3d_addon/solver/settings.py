@@ -15,7 +15,11 @@ Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
 Quality = Literal["normal", "fine", "finest"]
 StretchLaw = Literal["linear", "logarithmic"]
+Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
+
+# Frames between every two keys that a tolerance chooses from.
+DENSE_STEPS = 48
 
 _MOST_TURNS = 100
 
@@ -132,7 +136,7 @@ class PlayOptions:
         Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
         help; ``count`` is then not looked at.
     weights
-        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbours.
+        ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbors.
     also_at
         Positions of more in-betweens, each between 0 and 1.
 
@@ -142,7 +146,7 @@ class PlayOptions:
         If a value is of the wrong type or out of its range.
     """
 
-    count: int = 3
+    count: int = 5
     tolerance: float = 0.0
     weights: WeightKind = "smooth"
     also_at: tuple[float, ...] = ()

@@ -20,14 +20,17 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .collision.colliders import Collider
+from .combinations import combine as combining
+from .combinations.base import KeysOnBase
+from .combinations.combine import Combination
 from .errors import InputError
 from .fit import fit_pair as fitting
 from .fit.fitted_map import FittedMap
 from .frames import task as tasks
 from .frames.bake import Bake, evenly_spaced
 from .frames.task import Outcome, Task
-from .keys.keypair import KeyPair
-from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mode
+from .keys.keypair import KeyPair, consecutive_pairs
+from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
 from .support.progress import Progress, Steps, finish
 
@@ -63,10 +66,31 @@ class Work(Generic[T]):
 
 
 def fit(
-    key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None, **options: Unpack[FitChoices]
+    key0: ArrayLike,
+    key1: ArrayLike,
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
+    **options: Unpack[FitChoices],
 ) -> Work[FittedMap]:
     """The fit of two keys, step by step; see :func:`.api.fit` for the parameters."""
-    return Work(fitting.fit_pair(KeyPair.checked(key0, key1, faces, edges), FitOptions(**options)))
+    return Work(fitting.fit_pair(one_pair(key0, key1, faces, edges, polygons, mirror), FitOptions(**options)))
+
+
+def one_pair(
+    key0: ArrayLike,
+    key1: ArrayLike,
+    faces: ArrayLike,
+    edges: ArrayLike | None,
+    polygons: ArrayLike | None,
+    mirror: Mirror,
+) -> KeyPair:
+    """Two keys as :func:`.api.fit` takes them."""
+    ends = ("first", "second")
+    shapes = dict(zip(ends, (key0, key1), strict=True))
+    return consecutive_pairs(shapes, faces, edges, ends, polygons, mirror)[ends]
 
 
 def bake(
@@ -75,6 +99,8 @@ def bake(
     frames: int | ArrayLike = 5,
     edges: ArrayLike | None = None,
     *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
     mode: Mode = "natural",
     easing: Easing = "linear",
     colliders: Sequence[Collider] = (),
@@ -93,9 +119,25 @@ def bake(
         FrameOptions(mode, easing),
         times_of(frames, len(keys) - 1),
         Collider.joined([part.at_keys(len(keys)) for part in colliders]) if colliders else None,
+        polygons,
+        mirror,
     )
     task.require_memory(machine_limit_mb())
     return Work(_bake_of(tasks.carry_out(task)))
+
+
+def combine(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None = None,
+    *,
+    weights: Sequence[float] | None = None,
+    order: Sequence[int] | None = None,
+    **options: Unpack[FitChoices],
+) -> Work[Combination]:
+    """Several keys of one base on at once, step by step; see :func:`.api.combine` for the parameters."""
+    return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
 
 
 def times_of(frames: int | ArrayLike, pairs: int = 1) -> Floats:

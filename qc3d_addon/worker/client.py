@@ -115,7 +115,7 @@ class Worker:
             if clock.monotonic() > self._deadline:
                 self.close()
                 raise WorkerError(
-                    f"The work was stopped after its time limit of {self._limits.seconds:g} s; allow it more in the "
+                    f"The work was stopped after its time limit of {self._limits.seconds:g} s; raise the limit in the "
                     "add-on's preferences, or choose a lower quality."
                 )
             return None
@@ -143,7 +143,9 @@ class Worker:
     def _start(self) -> subprocess.Popen[bytes]:
         python = interpreter()
         if python is None:
-            raise WorkerError("No Python interpreter was found to work in; install Blender with its own Python.")
+            raise WorkerError(
+                "No Python interpreter was found for the background process; install Blender with its own Python."
+            )
         package = Path(__file__).resolve().parent.parent
         memory = self._limits.memory_mb * 2**20
         # Without the interpreter's own packages: the child must use the same libraries as this process.
@@ -207,25 +209,25 @@ class Worker:
 
 
 _HANGS = (
-    "The process that does the work has done nothing for {:g} s and was stopped; nothing was changed. Memory may have "
-    "run out: try again with a lower quality or fewer in-betweens."
+    "The background process has done nothing for {:g} s and was stopped; nothing was changed. Memory may have run out: "
+    "try again with a lower quality or fewer in-betweens."
 )
 _GARBLED = (
-    "The process that does the work sent something that is no message of it and was stopped; nothing was changed. Try "
-    "again, and report it if it happens again."
+    "The background process sent invalid data and was stopped; nothing was changed. Try again, and report it if it "
+    "happens again."
 )
 
 
 def _not_started(error: OSError) -> WorkerError:
     return WorkerError(
-        f"The work cannot be started in a process of its own, with temporary files in {temporary_place()}: "
+        f"The background process cannot be started with temporary files in {temporary_place()}: "
         f"{with_remedy(error)}."
     )
 
 
 def _out_of_memory(limits: Limits) -> str:
     limit = f" within its limit of {limits.memory_mb} MB" if limits.memory_mb else ""
-    more = ", or allow it more in the add-on's preferences" if limits.memory_mb else ""
+    more = ", or raise the limit in the add-on's preferences" if limits.memory_mb else ""
     return f"There is not enough memory{limit}; use fewer in-betweens, a lower quality or a smaller mesh{more}."
 
 
@@ -302,6 +304,6 @@ def _how_it_ended(status: int, errors_file: Path) -> str:
         how = f"was ended by {name}{reason}"
     else:
         how = f"ended without a result (exit status {status})"
-    last = f" Its last words: {lines[-1][:300]}" if lines else ""
+    last = f" Its last message: {lines[-1][:300]}" if lines else ""
     advice = "nothing was changed. Try again, with a lower quality if need be."
-    return f"The process that does the work {how}; {advice}{last}"
+    return f"The background process {how}; {advice}{last}"

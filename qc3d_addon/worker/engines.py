@@ -9,7 +9,7 @@ import sys
 
 from ..solver.meshing import tetwild_loading
 
-_TAKES_OVER = "The engine delaunay does the work here, since tetwild cannot: {}."
+_TAKES_OVER = "The engine delaunay is used here, because tetwild cannot run: {}."
 
 _probe: subprocess.Popen[bytes] | None = None
 _asked = False

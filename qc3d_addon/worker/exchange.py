@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,18 @@ from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
+from ..solver.keys.halves import MirrorPlane
 from ..solver.keys.keypair import KeyPair
 from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
+_PAIR = ("key0", "key1", "faces", "edges", "polygons")
 _TASK, _OUTCOME = "task.json", "outcome.json"
 
 
 def write_task(folder: Path, task: Task) -> None:
     """Write a task into an empty folder; ``read_task`` reads it."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
-        _write(folder / f"pair{number}.npz", key0=pair.key0, key1=pair.key1, faces=pair.faces, edges=pair.edges)
+        _write(folder / f"pair{number}.npz", **{name: getattr(pair, name) for name in _PAIR})
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
@@ -35,6 +37,7 @@ def write_task(folder: Path, task: Task) -> None:
     header = {
         "ends": list(task.pairs),
         "through": task.through,
+        "planes": [asdict(plane) for plane in next(iter(task.pairs.values())).planes],
         "fit_options": asdict(task.fit_options),
         "frame_options": asdict(task.frame_options),
         "play": None if task.play is None else asdict(task.play),
@@ -45,10 +48,14 @@ def write_task(folder: Path, task: Task) -> None:
 def read_task(folder: Path) -> Task:
     """Read the task that ``write_task`` wrote."""
     header = _read_json(folder / _TASK)
+    planes = tuple(
+        MirrorPlane(tuple(plane["normal"]), tuple(plane["direction"]), plane["offset"], plane["reach"])
+        for plane in header["planes"]
+    )
     pairs, kept = {}, {}
     for number, (first, second) in enumerate(header["ends"]):
         with np.load(folder / f"pair{number}.npz", allow_pickle=False) as stored:
-            pairs[first, second] = KeyPair(*(stored[name] for name in ("key0", "key1", "faces", "edges")))
+            pairs[first, second] = replace(KeyPair(*(stored[name] for name in _PAIR)), planes=planes)
         path = folder / f"kept{number}.map"
         if path.exists():
             kept[first, second] = path.read_bytes()
@@ -97,7 +104,7 @@ def read_outcome(folder: Path, task: Task) -> Outcome:
     with np.load(folder / "bake.npz", allow_pickle=False) as stored:
         times, frames = stored["times"], stored["frames"]
         measures = {name.removeprefix("measure "): stored[name] for name in stored.files if name.startswith("measure ")}
-    vertices = len(next(iter(task.pairs.values())).key0)
+    vertices = len(next(iter(task.pairs.values())).own.key0)
     known = task.times if task.moments is None else task.moments.times
     is_whole = np.array_equal(times, known) if task.play is None else np.isin(times, known).all() and len(times) > 1
     if not is_whole or frames.shape != (len(times), vertices, 3):

@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> None:
         _send(messages, {"error": ["MemoryError", ""]})
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
-        sentence = f"The process that does the work cannot go on: {errors.with_remedy(error)}{where}."
+        sentence = f"The background process cannot go on: {errors.with_remedy(error)}{where}."
         _send(messages, {"error": ["WorkerError", sentence]})
     except RuntimeError as error:
         if not any(word in str(error).lower() for word in _WORDS_OF_TOO_LITTLE_MEMORY):

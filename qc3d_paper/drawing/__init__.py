@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures with matplotlib."""
+"""Drawing with matplotlib and numpy: shaded shapes, slices, histograms, contact sheets."""

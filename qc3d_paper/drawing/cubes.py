@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cube's boundary, four faces in colours and one edge in red, before and after a map."""
+"""The cube's boundary after a map: four faces in colors, and one edge in red."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from qc3d_addon.solver.tets.mesh import TetMesh
 
 from .shading import Camera
 
-# Axis, side and colour of the faces; top and bottom are grey.
+# Axis, side and color of the faces; top and bottom are gray.
 _FACES = (
     (0, 1.0, (0.42, 0.62, 0.85)),
     (1, 0.0, (0.93, 0.75, 0.42)),
@@ -21,14 +21,22 @@ _FACES = (
     (1, 1.0, (0.75, 0.58, 0.80)),
 )
 _GREY, _RED = (0.85, 0.85, 0.85), (0.85, 0.05, 0.05)
-_MARGIN = 0.1
-_DARKEST = 0.7  # a face seen from its side
+_MARGIN = 0.1  # cube units around the cube, since a map may move its boundary
+_DARKEST = 0.7  # brightness of a face seen edge-on
 
 
 def draw_cube(axes: Axes, mesh: TetMesh, values: Floats, behind: bool = False) -> None:
-    """Draw where a map (N, 3) sends the boundary and its triangles; the edge between two coloured faces is red.
+    """Draw the boundary of the cube and its triangles after a map; the edge between two colored faces is red.
 
-    ``behind`` looks from the opposite side, where the other two coloured faces are and the red edge is hidden.
+    Parameters
+    ----------
+    axes : Axes
+    mesh : TetMesh
+        A mesh of the unit cube.
+    values : (N, 3)
+        Where the map sends the mesh's vertices.
+    behind : bool
+        Look from the opposite side, which shows the other two colored faces and hides the red edge.
     """
     faces = mesh.boundary_faces
     corners = mesh.points[faces]

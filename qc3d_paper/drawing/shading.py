@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw a triangle mesh as a shaded picture: an orthographic camera and a depth buffer in numpy, no window needed."""
+"""Shaded pictures of triangle meshes: an orthographic camera and a depth buffer in numpy; needs no window."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +14,15 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Directions to the camera, z up, and to what the animator calls them; objects look along -y, as Blender's do.
+# Directions toward the camera by name; z is up and objects face -y, as in Blender.
 VIEWS = {"front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0), "three-quarter": (0.6, -0.75, 0.3)}
 
-# Lights as direction (right, up, towards the camera) and strength: key from the upper left, fill from the right.
+# Lights: direction (right, up, toward the camera) and strength. The key light comes from the upper left, the fill light
+# from the right.
 _LIGHTS = (((-0.5, 0.65, 0.6), 0.75), ((0.8, 0.1, 0.5), 0.22))
 _AMBIENT = 0.2
+_MOST_PIXELS = 100_000  # around triangles that are drawn at once
+_BAND = 32  # rows of the picture that are drawn at once
 
 
 @dataclass(frozen=True)
@@ -27,9 +32,9 @@ class Camera:
     Parameters
     ----------
     axes : (3, 3)
-        Rows point right, up, and towards the camera.
+        Unit vectors in rows: right, up, and toward the camera.
     low, high : (2,)
-        Corners of what is seen, along right and up.
+        Opposite corners of the visible rectangle, along right and up.
     """
 
     axes: Floats
@@ -38,7 +43,7 @@ class Camera:
 
     @classmethod
     def around(cls, shapes: Floats, view: str, margin: float = 0.04) -> Camera:
-        """A camera that holds all shapes (k, n, 3), from one of ``VIEWS``."""
+        """A camera in the view named, one of ``VIEWS``, that shows all shapes (k, n, 3)."""
         axes = _axes(np.array(VIEWS[view]))
         flat = shapes.reshape(-1, 3) @ axes[:2].T
         low, high = flat.min(axis=0), flat.max(axis=0)
@@ -46,8 +51,15 @@ class Camera:
         return cls(axes, low - border, high + border)
 
 
+def upright(points: Floats, up: str) -> Floats:
+    """Points (..., 3) turned so that the axis ``up`` of x, y and z points along z, as pictures have it."""
+    if up == "y":
+        return np.asarray(points[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0]))
+    return np.asarray(points[..., [1, 2, 0]]) if up == "x" else points
+
+
 def best_view(key0: Floats, key1: Floats) -> str:
-    """The view of ``VIEWS`` in which the motion from one key to the other is seen best."""
+    """Name of the view in which the motion from one key to the other, both (n, 3), is largest."""
     motion = key1 - key0
     return max(VIEWS, key=lambda view: float(np.linalg.norm(motion @ _axes(np.array(VIEWS[view]))[:2].T)))
 
@@ -67,20 +79,22 @@ def draw(
     ----------
     points : (n, 3)
         Vertex positions.
-    faces : (m, 3)
+    faces : (m, 3) int64
         Triangles; their back sides are drawn darker.
+    camera : Camera
     height : int
-        Rows of the picture; the columns follow from the camera.
-    colour
-        Red, green, blue in 0..1, of the shape or of each triangle (m, 3).
-    background
+        Height of the picture in pixels; its width follows from the camera.
+    colour : (3,) or (m, 3)
+        Red, green, blue in 0..1, for the shape or for each triangle.
+    background : (3,)
         Red, green, blue in 0..1.
-    samples
+    samples : int
         Each pixel is the mean of ``samples`` x ``samples`` points.
 
     Returns
     -------
-    (height, width, 3) picture, first row on top.
+    (height, width, 3)
+        The picture, with colors in 0..1, top row first.
     """
     fine = height * samples
     scale = fine / (camera.high[1] - camera.low[1])
@@ -89,25 +103,33 @@ def draw(
     spots = (seen[:, :2] - camera.low) * scale
     normals = _vertex_normals(points, faces) @ camera.axes.T
 
-    triangle, rows, columns, weights = _covered(spots, faces, fine, width)
-    corners = faces[triangle]
-    depth = np.einsum("pk,pk->p", weights, seen[corners, 2])
-    # The last write to a pixel stays, so the nearest goes last.
-    order = np.argsort(depth, kind="stable")
-    nearest = np.full(fine * width, -1, dtype=np.int64)
-    nearest[rows[order] * width + columns[order]] = order
-    drawn = nearest >= 0
-    chosen = nearest[drawn]
+    paint = np.broadcast_to(np.array(colour), (len(faces), 3))
+    bands = []
+    for low in range(0, height, _BAND):
+        high = min(low + _BAND, height)
+        # Only what may reach into the band; the rest of the triangles costs nothing there.
+        inside = (spots[faces, 1].max(axis=1) >= low * samples) & (spots[faces, 1].min(axis=1) <= high * samples)
+        nearest = _nearest(
+            spots - [0.0, low * samples], seen[:, 2], faces[inside], (high - low) * samples, width
+        )
+        band = _shaded(nearest, faces[inside], normals, paint[inside], background)
+        bands.append(band.reshape(high - low, samples, width // samples, samples, 3).mean(axis=(1, 3)))
+    return np.asarray(np.concatenate(bands)[::-1])
 
-    normal = np.einsum("pk,pka->pa", weights[chosen], normals[corners[chosen]])
+
+def _shaded(
+    nearest: _Nearest, faces: Ints, normals: Floats, paint: Floats, background: tuple[float, float, float]
+) -> Floats:
+    """(pixels, 3) the light that comes from what is nearest."""
+    drawn = nearest.triangle >= 0
+    triangle, weights = nearest.triangle[drawn], nearest.weights[drawn]
+    normal = np.einsum("pk,pka->pa", weights, normals[faces[triangle]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     front = normal[:, 2] >= 0.0
     light = _brightness(np.where(front[:, None], normal, -normal)) * np.where(front, 1.0, 0.6)
-    picture = np.broadcast_to(np.array(background), (fine * width, 3)).copy()
-    paint = np.array(colour)
-    picture[drawn] = np.clip(light[:, None] * (paint if paint.ndim == 1 else paint[triangle[chosen]]), 0.0, 1.0)
-    picture = picture.reshape(fine // samples, samples, width // samples, samples, 3).mean(axis=(1, 3))
-    return np.asarray(picture[::-1])
+    picture = np.tile(background, (len(drawn), 1))
+    picture[drawn] = np.clip(light[:, None] * paint[triangle], 0.0, 1.0)
+    return picture
 
 
 def _axes(towards: Floats) -> Floats:
@@ -118,7 +140,7 @@ def _axes(towards: Floats) -> Floats:
 
 
 def _vertex_normals(points: Floats, faces: Ints) -> Floats:
-    """(n, 3): area-weighted, not normalised."""
+    """(n, 3) area-weighted vertex normals, not normalized."""
     corners = points[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.stack(
@@ -127,8 +149,34 @@ def _vertex_normals(points: Floats, faces: Ints) -> Floats:
     )
 
 
+class _Nearest(NamedTuple):
+    """Of each pixel the triangle in front, -1 for none, and the weights of its corners."""
+
+    triangle: Ints
+    weights: Floats
+
+
+def _nearest(spots: Floats, depths: Floats, faces: Ints, height: int, width: int) -> _Nearest:
+    """What is seen in each pixel, row by row: of a few triangles at a time, so that memory does not grow with them."""
+    found = _Nearest(np.full(height * width, -1, dtype=np.int64), np.zeros((height * width, 3)))
+    front = np.full(height * width, -np.inf)
+    spans = np.ptp(spots[faces], axis=1) + 1.0
+    share = np.cumsum(spans.prod(axis=1)) // _MOST_PIXELS
+    for first, last in pairwise([0, *(np.flatnonzero(np.diff(share)) + 1), len(faces)]):
+        triangle, rows, columns, weights = _covered(spots, faces[first:last], height, width)
+        triangle += first
+        depth = np.einsum("pk,pk->p", weights, depths[faces[triangle]])
+        pixel = rows * width + columns
+        # The last write to a pixel stays, so the nearest goes last.
+        order = np.argsort(depth, kind="stable")
+        order = order[depth[order] >= front[pixel[order]]]
+        front[pixel[order]], found.triangle[pixel[order]] = depth[order], triangle[order]
+        found.weights[pixel[order]] = weights[order]
+    return found
+
+
 def _covered(spots: Floats, faces: Ints, height: int, width: int) -> tuple[Ints, Ints, Ints, Floats]:
-    """Every pixel whose centre a triangle covers: triangle, row, column, and barycentric weights (p, 3)."""
+    """For each pixel center covered by a triangle: the triangle, row, column, and barycentric weights (p, 3)."""
     corners = spots[faces]
     most = np.array([width, height]) - 1
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, most).astype(np.int64)
@@ -160,7 +208,7 @@ def _cross(first: Floats, second: Floats) -> Floats:
 
 
 def _brightness(normals: Floats) -> Floats:
-    """(p,): diffuse light from both lamps, the ambient light, and a faint darkening towards the outline."""
+    """(p,) brightness: diffuse light from both lights, ambient light, and slight darkening toward the outline."""
     light = np.full(len(normals), _AMBIENT)
     for direction, strength in _LIGHTS:
         unit = np.array(direction) / np.linalg.norm(direction)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tetrahedra cut by a plane, and pictures of what varies over them."""
+"""Planar cuts through tetrahedral meshes, and pictures of measures of maps."""
 
 from __future__ import annotations
 
@@ -18,30 +18,38 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter
 
 _AXES = "xyz"
 _HISTOGRAM_BINS = 80
-# Edges that a plane crosses, after sorting: from the one corner on its side to the others; from each of two to two.
+_NARROW, _WIDE = 3.0, 30.0  # the largest value over the smallest: below there are even ticks, above powers of ten
+# Edges that a plane crosses, by sorted corner: from the single corner on one side to the three others, or from the two
+# corners on one side to the two on the other.
 _ONE = np.array([[0, 1], [0, 2], [0, 3], [0, 3]])
 _TWO = np.array([[0, 2], [0, 3], [1, 3], [1, 2]])
 
 
 def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floats]:
-    """Cut tetrahedra by the plane where one coordinate has a value.
+    """Cut tetrahedra by an axis-aligned plane.
 
     Parameters
     ----------
-    points : (N, 3), tets : (M, 4)
-        The mesh.
+    points : (N, 3)
+        Vertices.
+    tets : (M, 4) int64
+        Tetrahedra.
     axis : int
-        0, 1 or 2.
+        Axis perpendicular to the plane: 0, 1 or 2.
     place : float
-        The coordinate of the plane.
+        Coordinate of the plane along that axis.
 
     Returns
     -------
-    (k,) the tetrahedra that are cut, and (k, 4, 2) the corners of the cuts in the other two coordinates, in order
-    around them; triangles have their last corner twice.
+    rows : (k,) int64
+        The tetrahedra that are cut.
+    polygons : (k, 4, 2)
+        Corners of the cuts in the other two coordinates, in order around the polygon. A triangle has its last corner
+        twice.
     """
     above = points[tets, axis] > place
     count = above.sum(axis=1)
@@ -49,7 +57,7 @@ def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floa
     cuts, polygons = [], []
     for number, side, ends in ((1, above, _ONE), (3, ~above, _ONE), (2, above, _TWO)):
         rows = np.flatnonzero(count == number)
-        # Corners sorted so that the one by itself comes first, or, two and two, those above.
+        # Corners sorted so that the single one comes first, or the two above the plane.
         order = np.argsort(~side[rows], axis=1, kind="stable")
         corners = points[np.take_along_axis(tets[rows], order, axis=1)]
         first, second = corners[:, ends[:, 0]], corners[:, ends[:, 1]]
@@ -60,7 +68,7 @@ def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floa
 
 
 def draw_slice(axes: Axes, analysis: Analysis, axis: int, place: float, measure: str) -> None:
-    """Draw where a plane cuts the source, coloured by a measure of the analysis."""
+    """Draw the cut of a plane through the source mesh, colored by a measure of the analysis."""
     mesh = analysis.mapping.mesh
     rows, polygons = cut(mesh.points, mesh.tets, axis, place)
     values = analysis.measures[measure]
@@ -78,7 +86,7 @@ def draw_slice(axes: Axes, analysis: Analysis, axis: int, place: float, measure:
 
 
 def save_slices(analysis: Analysis, path: Path) -> None:
-    """Three slices through the middle of the source, for the dilatation and for the volume ratio."""
+    """Save slices through the middle of the source along all three axes, of the dilatation and of the volume ratio."""
     middle = 0.5 * (analysis.mapping.mesh.points.min(axis=0) + analysis.mapping.mesh.points.max(axis=0))
     figure, panels = pyplot.subplots(2, 3, figsize=(13, 8), layout="constrained")
     for row, (measure, title) in enumerate((("dilatation", "dilatation K"), ("volume_ratio", "volume ratio"))):
@@ -90,7 +98,7 @@ def save_slices(analysis: Analysis, path: Path) -> None:
 
 
 def save_histograms(analysis: Analysis, path: Path) -> None:
-    """How much of the source's volume has which eigenvalues, volume ratio and dilatations."""
+    """Save histograms, weighted by the source's volume, of eigenvalues, volume ratio and dilatations."""
     mesh = analysis.mapping.mesh
     share = 100.0 * mesh.volumes / mesh.volumes.sum()
     shown = {
@@ -111,8 +119,13 @@ def save_histograms(analysis: Analysis, path: Path) -> None:
         for label, values in curves.items():
             axes.hist(values[known[label]], bins, weights=share[known[label]], histtype="step", label=label)
         axes.set_xscale("log")
-        axes.set_yscale("log")
         axes.set_ylim(1e-4, 200.0)
+        axes.set_yscale("log")
+        axes.set_xlim(bins[0], bins[-1])
+        # A logarithmic axis of few decades would have a label at every minor tick.
+        axes.xaxis.set_major_locator(_ticks(bins[-1] / bins[0]))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(title)
         axes.axvline(1.0, color="0.7", linewidth=0.8, zorder=0)
         if len(curves) > 1:
@@ -120,3 +133,10 @@ def save_histograms(analysis: Analysis, path: Path) -> None:
     panels[0].set_ylabel("% of the volume")
     figure.savefig(path, dpi=110)
     pyplot.close(figure)
+
+
+def _ticks(ratio: float) -> Locator:
+    """Where a logarithmic axis has labels."""
+    if ratio < _NARROW:
+        return MaxNLocator(4)
+    return LogLocator(subs=(1.0, 2.0, 5.0)) if ratio < _WIDE else LogLocator()

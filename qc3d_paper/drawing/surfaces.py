@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes painted with their distortion."""
+"""Surfaces painted with their distortion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from qc3d_addon.solver.keys.keypair import KeyPair
 
-from .shading import Camera, Floats, best_view, draw
+from .shading import Camera, Floats, best_view, draw, upright
 from .sheets import BACKGROUND, KEY_COLOUR
 
 matplotlib.use("Agg")
@@ -21,21 +21,22 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-_HEIGHT = 420  # pixels of a shape
+_HEIGHT = 420  # height of a shape in pixels
 
 
-def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path) -> None:
-    """The first key, and the second once for each measure (n,), painted with it."""
-    camera = Camera.around(np.stack([pair.key0, pair.key1]), best_view(pair.key0, pair.key1))
+def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path, up: str = "z") -> None:
+    """Save a picture of the first key, and of the second key painted with each of the measures (n,), ``up`` upward."""
+    first, second = upright(pair.key0, up), upright(pair.key1, up)
+    camera = Camera.around(np.stack([first, second]), best_view(first, second))
     columns = 1 + len(measures)
     figure, panels = pyplot.subplots(1, columns, figsize=(4.2 * columns, 5.4), layout="constrained")
     figure.set_facecolor(BACKGROUND)
-    panels[0].imshow(draw(pair.key0, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
+    panels[0].imshow(draw(first, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
     panels[0].set_title("first key")
     for axes, (name, values) in zip(panels[1:], measures.items(), strict=True):
         colours = scale(name, values)
         paint = np.asarray(colours.mappable.to_rgba(values[pair.faces].mean(axis=1)))[:, :3]
-        axes.imshow(draw(pair.key1, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
+        axes.imshow(draw(second, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
         axes.set_title(f"second key: {name}")
         add_colour_bar(figure, colours, axes, location="bottom", shrink=0.7)
     for axes in panels:
@@ -45,7 +46,7 @@ def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path) -> N
 
 
 class Scale(NamedTuple):
-    """Colours from one value to another, logarithmic."""
+    """A logarithmic color scale from ``low`` to ``high``."""
 
     mappable: ScalarMappable
     low: float
@@ -53,12 +54,15 @@ class Scale(NamedTuple):
 
     @classmethod
     def of(cls, low: float, high: float, colours: str) -> Scale:
-        """A scale of one of matplotlib's colour maps."""
+        """A scale that uses one of matplotlib's color maps."""
         return cls(ScalarMappable(LogNorm(low, high, clip=True), colours), low, high)
 
 
 def scale(name: str, values: Floats) -> Scale:
-    """Colours for a measure of any place, logarithmic, the outermost percent cut off."""
+    """A color scale for the values of a measure, clipped at their 99th percentile.
+
+    Dilatations start at 1; other measures are symmetric about 1.
+    """
     usable = values[np.isfinite(values) & (values > 0.0)]
     if "dilatation" in name:
         end = max(float(np.percentile(usable, 99)), 1.01) if len(usable) else 1.01
@@ -69,7 +73,7 @@ def scale(name: str, values: Floats) -> Scale:
 
 
 def add_colour_bar(figure: Figure, colours: Scale, axes: Any, **options: Any) -> None:  # noqa: ANN401
-    """The scale beside or below ``axes``, with its ends and its middle written out."""
+    """Add a color bar to ``axes``, labeled at its ends and its middle."""
     ticks = [colours.low, (colours.low * colours.high) ** 0.5, colours.high]
     bar = figure.colorbar(colours.mappable, ax=axes, **options)
     bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3 to 5: maps of the cube, rebuilt from their representation."""
+"""Figures 3 to 5 (section 5.4): bijections of the cube, reconstructed from their representation."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ BIJECTIONS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
     "5": ("waves that slide on the faces", shapes.sliding),
 }
 _CLAIM = "A bijection of the cube is rebuilt from its representation with an error near machine precision."
-_EXACT = 1e-9
+_EXACT = 1e-9  # cube units; far above rounding of the linear systems, far below anything visible
 
 
 def draw(number: str, title: str, mapping: Mapping, file: BinaryIO) -> Caption:
-    """Draw one of the figures: the map on the cube's faces, a slice of it, and the error of its rebuilding."""
+    """Draw one of the figures: the map on the cube's faces, a slice, and the errors of the reconstruction."""
     mesh = mapping.mesh
     rebuilt = reconstruct(mesh, mapping.stretch, Conditions.sliding_cube(mesh))
     error = np.linalg.norm(rebuilt.values - mapping.values, axis=1)
@@ -65,7 +65,16 @@ def draw(number: str, title: str, mapping: Mapping, file: BinaryIO) -> Caption:
 
 
 def without_folds(mesh: TetMesh, title: str, bijection: Callable[[Floats], Floats]) -> tuple[str, Mapping]:
-    """The bijection at the vertices, damped as far as the mesh needs to follow it without a fold; the title says so."""
+    """The piecewise linear map with the bijection's values at the vertices, and its title.
+
+    Where that map would fold, because the mesh is too coarse, all displacements are damped until it does not, and the
+    title says by how much.
+
+    Raises
+    ------
+    InputError
+        If it folds even with a tenth of the displacements.
+    """
     for percent in (100, 90, 80, 70, 60, 50, 25, 10):
         mapping = Mapping(mesh, mesh.points + percent / 100.0 * (bijection(mesh.points) - mesh.points))
         if mapping.folds == 0:
@@ -74,7 +83,7 @@ def without_folds(mesh: TetMesh, title: str, bijection: Callable[[Floats], Float
 
 
 def _draw_slice(axes: Axes, mapping: Mapping, rebuilt: Mapping) -> None:
-    """Where the tetrahedra around the middle plane go, by their volume ratio: cut after the map."""
+    """Draw a slice through the middle of the cube after the map, colored by the volume ratio."""
     rows, polygons = cut(rebuilt.values, mapping.mesh.tets, 2, 0.5)
     ratio = np.log2(np.linalg.det(mapping.jacobians)[rows])
     drawn = PolyCollection(list(polygons), array=ratio, cmap="coolwarm", edgecolor="0.3", linewidth=0.2)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is written below a figure: what the paper claims, what was measured, and whether it holds."""
+"""Captions: what the paper claims, what was measured, and whether the claim holds."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Caption:
-    """The text of one figure.
+    """The caption of one figure.
 
     Parameters
     ----------
-    figures
-        The paper's numbers of the figures, such as "3".
-    title
-        What is seen.
-    claim
+    figures : str
+        Number of the figure in the paper, such as "3".
+    title : str
+        What the figure shows.
+    claim : str
         What the paper claims.
-    measured
+    measured : str
         What was measured here.
-    holds
-        Whether the claim holds, in a sentence that begins with Yes, No or In part.
+    holds : str
+        Whether the claim holds: a sentence that begins with Yes, No or In part.
     """
 
     figures: str
@@ -33,7 +33,7 @@ class Caption:
     holds: str
 
     def text(self, picture: Path) -> str:
-        """The figure and its caption as Markdown."""
+        """Markdown of the figure, whose picture is in the same folder, and its caption."""
         return (
             f"## Figure {self.figures}: {self.title}\n\n![{self.title}]({picture.name})\n\n"
             f"**The paper claims:** {self.claim}\n\n**Measured:** {self.measured}\n\n**Holds?** {self.holds}\n"

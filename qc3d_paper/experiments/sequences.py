@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 6 and 7: sequences of faces and of bodies, by the paper's interpolation and by ours."""
+"""Figures 6 and 7 (section 6.1): sequences of faces and of bodies, by the paper's interpolation and by ours."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from qc3d_addon.solver.frames.bake import Bake
 from qc3d_addon.solver.frames.measures import worst_excess
 from qc3d_addon.solver.settings import Mode
 
+from ..drawing.shading import upright
 from ..drawing.sheets import Row, save_sheet, straight_blend
 from . import shapes
 from .caption import Caption
@@ -21,7 +22,7 @@ from .shapes import Pose
 
 MODES: tuple[Mode, ...] = ("linear", "natural")
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
-_MILD = 0.05  # what an eye forgives: lengths 5 % beyond those of the keys
+_MILD = 0.05  # edge lengths up to 5 % beyond those of the keys are taken as natural
 _CLAIMS = {
     "6": "Mild sequences, faces: interpolating the representation linearly gives natural shapes in between.",
     "7": "Extreme sequences, bodies: interpolating the representation linearly gives natural shapes in between too.",
@@ -48,7 +49,9 @@ def draw(number: str, poses: tuple[Pose, ...], data: Path | None, file: BinaryIO
             f"{pose.label}: worst edge beyond its lengths in the keys, straight blend {excess[0]:.1%}, linear "
             f"{excess[1]:.1%}, natural {excess[2]:.1%}; folded tetrahedra in the frames of linear {folds}"
         )
-        rows += [_upright(row, pose)._replace(label=f"{pose.second}\n{row.label}") for row in found]
+        rows += [
+            row._replace(label=f"{pose.second}\n{row.label}", frames=upright(row.frames, pose.up)) for row in found
+        ]
     save_sheet(rows, "three-quarter" if number == "6" else "auto", 150, file)
     worst = np.max(excesses, axis=0)
     if worst[1] < _MILD and not folded:
@@ -62,9 +65,3 @@ def draw(number: str, poses: tuple[Pose, ...], data: Path | None, file: BinaryIO
         )
     title = "; ".join(pose.label for pose in poses) + ": straight blend, linear (the paper's), natural (ours)"
     return Caption(number, title, _CLAIMS[number], ". ".join(texts) + ".", holds)
-
-
-def _upright(row: Row, pose: Pose) -> Row:
-    if pose.up == "z":
-        return row
-    return row._replace(frames=row.frames[..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0]))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shapes and maps of the experiments: from formulas, from the demo files, or from a folder of .npz files."""
+"""Shapes and maps of the experiments: from formulas, from the demo files, or from a folder of .npz files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 
 class Pose(NamedTuple):
-    """Two shapes of one mesh: a file, an object in it where it is a .blend, and two names."""
+    """Two shapes of one mesh: a file, an object in it (for a .blend), the names of the shapes, and the up axis."""
 
     file: str
     object: str
@@ -36,7 +36,7 @@ class Pose(NamedTuple):
 
     @property
     def label(self) -> str:
-        """As captions name it."""
+        """Name of the pose in captions."""
         return f"{self.object or Path(self.file).stem} {self.first} → {self.second}"
 
 
@@ -47,12 +47,12 @@ DATA_BODIES = tuple(Pose("body.npz", "", "rest", key, "z") for key in ("t_pose",
 
 
 def read(pose: Pose, data: Path | None) -> KeyPair:
-    """The two shapes of a pose, from the demo files, or from the folder ``data``.
+    """Read the two shapes of a pose, from the demo files or from the folder ``data``.
 
     Raises
     ------
     InputError
-        If the file is not there or lacks a shape.
+        If the file is missing or lacks a shape, or if a demo file is needed and Blender's module does not load.
     """
     if pose.file.endswith(".npz"):
         if data is None:
@@ -73,18 +73,18 @@ def read(pose: Pose, data: Path | None) -> KeyPair:
 
 
 def fitted(pair: KeyPair) -> FittedMap:
-    """The fold-free map of the cube that carries one shape onto the other."""
+    """The fold-free map of the cube that carries the first shape onto the second."""
     return finish(fit_pair(pair, OPTIONS))
 
 
 def cube() -> TetMesh:
-    """The unit cube, finest around a ball in its middle."""
+    """A mesh of the unit cube, finest around a sphere in its middle."""
     points, faces = _ball()
     return fill_cube(points, faces, OPTIONS).mesh
 
 
 def _ball(rings: int = 16, radius: float = 0.3) -> tuple[Floats, Ints]:
-    """A ball of rings and segments in the middle of the cube, normals pointing out."""
+    """A sphere of rings and segments in the middle of the cube, normals pointing out."""
     heights = np.pi * np.arange(1, rings) / rings
     around = np.pi * np.arange(2 * rings) / rings
     ring = np.stack(
@@ -109,13 +109,13 @@ def _ball(rings: int = 16, radius: float = 0.3) -> tuple[Floats, Ints]:
 
 
 def along_axes(points: Floats) -> Floats:
-    """Every coordinate by its own bijection of 0..1."""
+    """Points (n, 3) of the cube with each coordinate moved by a bijection of 0..1 of its own."""
     x, y, z = points.T
     return np.column_stack([x**2 * (1.5 - 0.5 * x), (np.exp(y) - 1.0) / (np.e - 1.0), np.sin(0.5 * np.pi * z)])
 
 
 def whirl(points: Floats, degrees: float = 90.0) -> Floats:
-    """A whirl about the middle of the cube, by up to so many degrees, that dies away before the faces."""
+    """Points (n, 3) of the cube turned around its center by up to ``degrees``, less and less toward the faces."""
     offsets = points - 0.5
     fading = np.maximum(1.0 - 4.0 * np.einsum("ij,ij->i", offsets, offsets), 0.0) ** 2
     turns = np.radians(degrees) * fading[:, None] * np.array([2.0, -1.0, 2.0]) / 3.0
@@ -123,7 +123,7 @@ def whirl(points: Floats, degrees: float = 90.0) -> Floats:
 
 
 def sliding(points: Floats) -> Floats:
-    """Every face moves within itself, the inside along with it."""
+    """Points (n, 3) of the cube moved by waves that let every face slide within itself."""
     x, y, z = (np.pi * coordinate for coordinate in points.T)
     moved = points + np.column_stack(
         [
@@ -132,6 +132,6 @@ def sliding(points: Floats) -> Floats:
             0.08 * np.sin(z) * np.cos(2.0 * x) * np.cos(y),
         ]
     )
-    # sin(pi) is not zero in floating point; the faces are kept exactly.
+    # sin(pi) is not exactly zero in floating point; the faces must be kept exactly.
     held = (points == 0.0) | (points == 1.0)
     return np.where(held, points, moved)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 8 to 13: two maps compressed by their lowest modes, each in three figures."""
+"""Figures 8 to 13 (section 6.2): two maps compressed by their lowest modes, three figures for each."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from .shapes import Pose
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-_MODES = 400
+_MODES = 400  # computing all modes of a mesh would take too long
 _SHOWN = 60  # modes in the pictures of the cube
 _COUNTS = (1, 2, 4, 8, 16, 30, 60, 120, 240, 400)
-_FITTED_COUNTS = (4, 16, 60, 240)  # each is a search
-_WINDOW = 15
+_FITTED_COUNTS = (4, 16, 60, 240)  # fewer, because each needs an optimization
+_WINDOW = 15  # modes in the moving average of the spectra
 _CHANNELS = ("xx", "xy", "xz", "yy", "yz", "zz")
-_EXACTLY = 1e-9  # a step so small that nothing is rounded
+_EXACTLY = 1e-9  # a quantization step so small that rounding does not matter
 _LINES = {"coordinates": "k--o", "published": "C1-o", "logarithm": "C0-o", "fitted": "C2-s"}
 _LABELS = {
     "coordinates": "coordinates",
@@ -45,14 +45,14 @@ _SCHEMES: tuple[Scheme, ...] = ("published", "logarithm", "fitted")
 
 
 class Experiment:
-    """One map, and what its figures need, computed once.
+    """One map and everything that its three figures need, computed once.
 
     Parameters
     ----------
     pose : Pose
-        The shapes that the map carries onto each other.
+        The map carries the first shape of this pose onto the second.
     data : Path, optional
-        The folder of the shapes, where they are no demo file.
+        Folder of the shapes, if they are not from a demo file.
     """
 
     def __init__(self, pose: Pose, data: Path | None) -> None:
@@ -65,7 +65,7 @@ class Experiment:
 
     @cached_property
     def codecs(self) -> dict[Scheme, Codec]:
-        """A codec for each scheme."""
+        """The codec of each scheme."""
         mesh = self.mapping.mesh
         first = Codec(mesh, self.modes, "published")
         return {
@@ -75,7 +75,7 @@ class Experiment:
         }
 
     def restored(self, scheme: Scheme, modes: int) -> Mapping | None:
-        """The map from its first modes, nothing rounded; None where the truncated representation has no map."""
+        """The map restored from its first modes without quantization; None if the truncated form has no map."""
         codec = self.codecs[scheme]
         targets = self.mapping.values[None]
         try:
@@ -85,23 +85,23 @@ class Experiment:
         return Mapping(self.mapping.mesh, rebuilt[0])
 
     def transferred(self, scheme: Scheme) -> Mapping | None:
-        """The map after the way from tetrahedra to vertices and back, all modes kept."""
+        """The map after the transfer from tetrahedra to vertices and back, with all modes kept."""
         return transferred(self.mapping, scheme, Conditions.sliding_cube(self.mapping.mesh))
 
     def coordinates(self, modes: int) -> Floats:
-        """(N, 3) the map's displacements from their first modes: what the representation is compared with."""
+        """(N, 3) the map whose displacements are truncated to their first modes, for comparison."""
         mesh = self.mapping.mesh
         basis = self.codecs["published"].spectrum.modes[:, :modes]
         weighted = Transfer(mesh).vertex_volumes[:, None] * (self.mapping.values - mesh.points)
         return np.asarray(mesh.points + basis @ (basis.T @ weighted))
 
     def error(self, values: Floats) -> float:
-        """Mean square distance from the map."""
+        """Mean square distance of values (N, 3) from the map, squared cube units."""
         return float(((values - self.mapping.values) ** 2).sum(axis=1).mean())
 
 
 def draw_cubes(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """The cube's faces after the map, and after its coordinates and its representation were cut off."""
+    """Draw the cube's faces after the map, and after truncation of its coordinates and of its representation."""
     mapping, modes = experiment.mapping, min(_SHOWN, experiment.modes)
     mesh = mapping.mesh
     coordinates = experiment.coordinates(modes)
@@ -133,7 +133,7 @@ def draw_cubes(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
 
 
 def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """Size of the six channels' coefficients, by mode."""
+    """Draw the magnitude of the six channels' coefficients by mode."""
     codec, mesh = experiment.codecs["published"], experiment.mapping.mesh
     coefficients = np.abs(codec.projected(experiment.mapping, experiment.modes))
     figure, panels = pyplot.subplots(2, 3, figsize=(11, 5.4), sharex=True, sharey=True, layout="constrained")
@@ -141,7 +141,7 @@ def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Captio
     for axes, name, channel in zip(panels.ravel(), _CHANNELS, coefficients.T, strict=True):
         modes = np.arange(1, len(channel) + 1)
         axes.semilogy(modes, np.maximum(channel, 1e-12), ".", markersize=2.5, color="0.6")
-        inner = channel[1:]  # the constant mode, which holds the identity, is a point by itself
+        inner = channel[1:]  # the constant mode, which contains the identity, is not averaged with the others
         mean = np.sqrt(np.convolve(inner**2, window, "same") / np.convolve(np.ones_like(inner), window, "same"))
         axes.semilogy(modes[1:], np.maximum(mean, 1e-12), color="C0", linewidth=1.5)
         axes.set_title(name, fontsize=10)
@@ -150,7 +150,7 @@ def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Captio
     figure.supylabel(f"size of the coefficient; blue: root mean square of {_WINDOW}")
     figure.savefig(file, dpi=100)
     pyplot.close(figure)
-    # Without the constant mode, which holds the identity.
+    # Without the constant mode, which contains the identity.
     energy = (coefficients[1:] ** 2).sum(axis=1)
     tenth = max(1, len(energy) // 10)
     share = float(energy[:tenth].sum() / energy.sum())
@@ -174,7 +174,7 @@ def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Captio
 
 
 def draw_errors(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """Mean square error by the number of modes, with that between source and target for comparison."""
+    """Draw the mean square error by the number of modes, and that between source and target for comparison."""
     every = [count for count in _COUNTS if count <= experiment.modes]
     counts: dict[str, list[int]] = {"coordinates": every, "published": every, "logarithm": every}
     counts["fitted"] = [count for count in _FITTED_COUNTS if count <= experiment.modes]
@@ -214,5 +214,5 @@ def draw_errors(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
 
 
 def _part_of(experiment: Experiment, restored: Mapping | None) -> float:
-    """Mean square error over that between source and target."""
+    """Mean square error relative to that between source and target; NaN without a map."""
     return np.nan if restored is None else experiment.error(restored.values) / experiment.reference

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Archives that no program writes: small files that would take much memory, and names that mean two things."""
+"""Archives that no ordinary program writes: small files that would take much memory, and ambiguous names."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command that writes, with inputs that it finds in the working folder, and what the attacks look at."""
+"""All commands that write files, with inputs in the working folder, and what the attacks check."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ QUICK = ["--mode", "straight"]
 KEYS = ["--from", "straight", "--to", "bent"]
 SCENE_KEYS = ["--object", "Bar", "--from", "Basis", "--to", "Bent"]
 _INTERPOLATE = ["interpolate", "bar.npz", *KEYS, "--frames", "0", *QUICK]
+_COMBINE = ["combine", "bar.npz", "--rest", "straight", "--outer", "bent", "--inner", "leaned"]
 _BAKE = ["bake", "bar.blend", *SCENE_KEYS, "--frames", "1", *QUICK]
 _COMPRESS = ["compress", "map.npz", "--modes", "3", "--scheme", "published"]
 
@@ -17,6 +18,7 @@ _COMPRESS = ["compress", "map.npz", "--modes", "3", "--scheme", "published"]
 COMMANDS = {
     "interpolate": ([*_INTERPOLATE, "--output", "OUT"], ".npz"),
     "interpolate's report": ([*_INTERPOLATE, "--output", "OTHER", "--report", "OUT"], ".json"),
+    "combine": ([*_COMBINE, "--output", "OUT"], ".npz"),
     "bake": ([*_BAKE, "--output", "OUT"], ".blend"),
     "bake's report": ([*_BAKE, "--output", "OTHER", "--report", "OUT"], ".json"),
     "reconstruct": (["reconstruct", "map.npz", "--output", "OUT"], ".npz"),

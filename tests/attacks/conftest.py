@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the attacks share: a user without rights, a small disk, small inputs, and the command as a program.
+"""Shared by the attacks: a user without rights, a small disk, small inputs, and the command as a program.
 
-Everything happens in a folder of the test's own, never with the machine's devices or its folder for temporary files.
+Everything happens in a folder of the test, never in the machine's devices or its folder for temporary files.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def inputs(bar: dict[str, np.ndarray], bar_scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with an input for every command."""
     folder = tmp_path_factory.mktemp("inputs")
-    np.savez(folder / "bar.npz", **bar)
+    leaned = bar["V0"] + bar["V0"][:, 2:] * [0.0, 0.1, 0.0]
+    np.savez(folder / "bar.npz", **(bar | {"shape_names": np.array(["straight", "bent", "leaned"]), "V2": leaned}))
     shutil.copy(bar_scene, folder / "bar.blend")
     mesh = kuhn_grid(2)
     values = mesh.points + 0.1 * np.sin(np.pi * mesh.points) * mesh.points[:, [1, 2, 0]]

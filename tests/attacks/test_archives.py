@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Archives of arrays made to take memory: what is allocated is counted, and what is said is one sentence."""
+"""Archives crafted to exhaust memory: allocations are counted, and the error is one sentence."""
 
 from __future__ import annotations
 

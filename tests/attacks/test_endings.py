@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""However a command ends, nothing of it goes on and nothing of it lies about."""
+"""However a command ends, it leaves no process and no temporary file behind."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from qc3d_addon.solver.meshing.tetwild_loading import unavailable_reason
 from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.worker.client import Worker
 
+from ..command_lines import with_others
 from ..worker.test_client import small_task
 from .commands import KEYS, is_alive, listing
 
@@ -310,14 +311,14 @@ class TestFullTemporaryDisks:
     def test_with_the_engine_that_needs_one(self, full: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         from qc3d_addon.cli import main
 
-        assert main.main([*INTERPOLATE, "--engine", "tetwild"]) == 2
+        assert main.main(with_others(INTERPOLATE, ["--engine", "tetwild"])) == 2
         said = capsys.readouterr().err
         assert "qc3d: The meshing engine tetwild cannot work with temporary files in " in said
         assert "No space left on device; make room on that disk" in said
         assert "lower quality" not in said
         assert len(said.splitlines()) == 1
         assert os.listdir(full) == ["ballast"]
-        assert main.main([*INTERPOLATE, "--engine", "auto"]) == 0  # another engine steps in, and that is said
+        assert main.main(with_others(INTERPOLATE, ["--engine", "auto"])) == 0
         assert "No space left on device" in capsys.readouterr().err
 
     @needs_tetwild
@@ -330,9 +331,9 @@ class TestFullTemporaryDisks:
             raise FileNotFoundError(2, "No usable temporary directory found")
 
         monkeypatch.setattr(tempfile, "gettempdir", none)
-        assert main.main([*INTERPOLATE, "--engine", "tetwild"]) == 2
+        assert main.main(with_others(INTERPOLATE, ["--engine", "tetwild"])) == 2
         assert "in any of the places for them: No usable temporary directory found; make" in capsys.readouterr().err
-        assert main.main([*INTERPOLATE, "--engine", "auto"]) == 0
+        assert main.main(with_others(INTERPOLATE, ["--engine", "auto"])) == 0
 
     def test_where_blender_starts_a_bake(self, full: Path) -> None:
         from qc3d_addon.solver.errors import WorkerError

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sweep of private folders takes what killed processes left, and nothing else, whatever it looks like."""
+"""The sweep of private folders removes what killed processes left, and nothing else that looks like it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outputs of every command: what is no file is refused, links are followed, nobody else can reach what is half done."""
+"""Outputs of all commands: only ordinary files are replaced, links are followed, unfinished files stay private."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams that are closed or broken, limits of the system, and files that have the names of libraries."""
+"""Hostile surroundings: closed or broken streams, system limits, and files named like libraries."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The classical methods that the benchmark compares against, and the exact bar."""
+"""The classical methods of the benchmark, and the exact in-betweens of the bar."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the benchmark says about its figures: limits, rivals, stored results, tables."""
+"""The benchmark's report: limits, comparison with classical methods, stored results, tables."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stages' benchmark: its shapes, and one small measurement from end to end."""
+"""The benchmark of the stages: its shapes, and one small measurement from end to end."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty scene with the add-on registered around every test, a small figure with shape keys, and a quick map."""
+"""Fixtures for all tests in Blender: an empty scene with the add-on registered, a small figure with shape keys, and a
+fast map.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
-from qc3d_addon.blender.keys import slider  # noqa: E402
+from qc3d_addon.blender.keys import drivers  # noqa: E402
+from qc3d_addon.blender.keys.control import slider_path  # noqa: E402
 from qc3d_addon.blender.store import records  # noqa: E402
 from qc3d_addon.solver.fit import fit_pair  # noqa: E402
 from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
@@ -205,7 +208,13 @@ def _describe_keys(keys: bpy.types.Key) -> dict[str, Any]:
 @pytest.fixture
 def slider_drivers() -> Callable[[bpy.types.Object, str], dict[str, bpy.types.Driver]]:
     """Gives the drivers of an object's shape keys that read a slider."""
-    return lambda obj, name: slider.driven_by(obj.data.shape_keys, name)
+
+
+    def found(obj: bpy.types.Object, name: str) -> dict[str, bpy.types.Driver]:
+        curves = drivers.driven_by(obj.data.shape_keys, slider_path(name))
+        return {path: curve.driver for path, curve in curves.items()}
+
+    return found
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be done with in-betweens that were baked: removed, keyframed, copied, mirrored, exported."""
+"""Operations on baked in-betweens: remove, keyframe, copy, mirror, export."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ import pytest
 
 from qc3d_addon.blender import compat
 from qc3d_addon.blender.heat_map import heat_map
-from qc3d_addon.blender.keys import slider
+from qc3d_addon.blender.keys.control import value_path
 from qc3d_addon.blender.store import kept_measures
 from qc3d_addon.blender.store.records import PROPERTY, Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 Shown = Callable[..., np.ndarray]
 State = Callable[[], dict[str, Any]]
 ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
@@ -41,7 +41,9 @@ OPERATORS = (
 
 
 def bake(to_key: str = "Lean", **choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key=to_key, mode="linear", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key=to_key, mode="linear", **choices
+    ) == {"FINISHED"}
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -193,7 +195,7 @@ class TestToKeyframes:
         assert SLIDER not in figure
         assert not Record.read(figure.data.shape_keys).chains
         keys = figure.data.shape_keys
-        curve = compat.find_fcurve(keys, 'key_blocks["Basis→Lean 2/4"].value')
+        curve = compat.find_fcurve(keys, 'key_blocks["Basis_to_Lean_50"].value')
         assert curve is not None
         assert {point.interpolation for point in curve.keyframe_points} == {"LINEAR"}
         assert len(curve.keyframe_points) < 24  # no keyframes where the value goes on as it does
@@ -226,12 +228,12 @@ class TestToKeyframes:
         self, figure: bpy.types.Object, capfd: pytest.CaptureFixture[str]
     ) -> None:
         bake(count=1)
-        key = figure.data.shape_keys.key_blocks[f"{SLIDER} 1/2"]
-        curve = compat.ensure_fcurve(figure.data.shape_keys, slider.value_path(key.name), ExitStack())
+        key = figure.data.shape_keys.key_blocks[f"{SLIDER}_50"]
+        curve = compat.ensure_fcurve(figure.data.shape_keys, value_path(key.name), ExitStack())
         curve.keyframe_points.insert(7, 0.25)
         assert bpy.ops.qc3d.to_keyframes(frame_start=1, frame_end=3) == {"FINISHED"}
         assert [point.co.x for point in curve.keyframe_points] == [1.0, 3.0]
-        assert f"Keyframes that '{SLIDER} 1/2' had under its driver were replaced" in "".join(capfd.readouterr())
+        assert f"Keyframes that '{SLIDER}_50' had under its driver were replaced" in "".join(capfd.readouterr())
 
     def test_a_deleted_slider(self, figure: bpy.types.Object) -> None:
         bake()
@@ -243,7 +245,7 @@ class TestToKeyframes:
 class TestAbsoluteKeys:
     def test_a_deleted_step(self, figure: bpy.types.Object, state: State) -> None:
         bake(count=3)
-        figure.active_shape_key_index = figure.data.shape_keys.key_blocks.find(f"{SLIDER} 2/4")
+        figure.active_shape_key_index = figure.data.shape_keys.key_blocks.find(f"{SLIDER}_50")
         bpy.ops.object.shape_key_remove()
         before = state()
         with pytest.raises(RuntimeError, match=f"Shape keys of '{SLIDER}' were deleted; re-bake it first"):
@@ -268,7 +270,7 @@ class TestAbsoluteKeys:
         assert bpy.ops.qc3d.absolute_keys() == {"FINISHED"}
         copy = bpy.data.objects["Figure absolute"]
         assert not copy.data.shape_keys.use_relative
-        assert [key.name for key in copy.data.shape_keys.key_blocks] == ["0/4", "1/4", "2/4", "3/4", "4/4"]
+        assert copy.data.shape_keys.key_blocks.keys()[::6] == [f"{SLIDER}_{place}" for place in ("00", 25, 50, 75, 100)]
         assert state()["keys"][keys.name] == before
         for place in (0.0, 0.25, 0.3, 0.5, 0.9, 1.0):
             expected = shown(figure, **{SLIDER: place})
@@ -276,11 +278,11 @@ class TestAbsoluteKeys:
         assert not [name for name in (*copy.keys(), *copy.data.shape_keys.keys()) if "qc3d" in name]
 
     def test_where_no_step_is_the_basis(self, figure: bpy.types.Object, shown: Shown) -> None:
-        bpy.ops.qc3d.bake_inbetweens(from_key="Lean", to_key="Stretch", mode="linear", count=2)
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Lean", to_key="Stretch", mode="linear", count=2)
         bpy.ops.qc3d.absolute_keys()
         copy = bpy.data.objects["Figure absolute"]
         for place in (0.0, 0.5, 1.0):
-            expected = shown(figure, **{"Lean→Stretch": place})
+            expected = shown(figure, Lean_to_Stretch=place)
             assert np.abs(shown(copy) - expected).max() < 1e-5
 
 
@@ -307,15 +309,15 @@ class TestMirror:
     def test_every_step(self, even: bpy.types.Object, shapes: ReadShapes, shown: Shown) -> None:
         even.data.shape_keys.key_blocks["Lean"].name = "Lean.L"
         bake("Lean.L", count=2)
-        there = shown(even, **{"Basis→Lean.L": 0.5})
+        there = shown(even, **{"Basis_to_Lean.L": 0.5})
         rest = shapes(even)["Basis"]
-        even["Basis→Lean.L"] = 0.0
+        even["Basis_to_Lean.L"] = 0.0
         assert bpy.ops.qc3d.mirror() == {"FINISHED"}
         got = shapes(even)
         for step in (1, 2, 3):
-            expected = self.mirrored(got[f"Basis→Lean.L {step}/3"], rest)
-            np.testing.assert_array_equal(got[f"Basis→Lean.R {step}/3"], expected)
-        seen = shown(even, **{"Basis→Lean.R": 0.5})
+            expected = self.mirrored(got[f"Basis_to_Lean.L_{100 * step / 3:.0f}"], rest)
+            np.testing.assert_array_equal(got[f"Basis_to_Lean.R_{100 * step / 3:.0f}"], expected)
+        seen = shown(even, **{"Basis_to_Lean.R": 0.5})
         assert np.abs(seen - self.mirrored(there, rest)).max() < 1e-6
 
     def test_again_it_is_brought_up_to_date(self, even: bpy.types.Object, shapes: ReadShapes) -> None:
@@ -328,10 +330,10 @@ class TestMirror:
         bpy.ops.qc3d.mirror(slider=SLIDER)
         got = shapes(even)
         assert list(got) == names
-        expected = self.mirrored(got["Basis→Lean 2/2"], got["Basis"])
-        np.testing.assert_array_equal(got["Basis→Lean mirrored 2/2"], expected)
-        assert bpy.ops.qc3d.remove(slider="Basis→Lean mirrored") == {"FINISHED"}
-        assert [name for name in shapes(even) if "→" in name] == ["Basis→Lean 1/2", "Basis→Lean 2/2"]
+        expected = self.mirrored(got["Basis_to_Lean_100"], got["Basis"])
+        np.testing.assert_array_equal(got["Basis_to_Lean_mirrored_100"], expected)
+        assert bpy.ops.qc3d.remove(slider="Basis_to_Lean_mirrored") == {"FINISHED"}
+        assert [name for name in shapes(even) if "_to_" in name] == ["Basis_to_Lean_50", "Basis_to_Lean_100"]
 
     def test_it_shows_the_same_result_at_the_other_side(self, even: bpy.types.Object, shown: Shown) -> None:
         bake(count=2)
@@ -355,9 +357,9 @@ class TestMirror:
         bake(count=1)
         bpy.ops.qc3d.mirror()
         before = state()
-        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis→Lean'; mirror that one again"):
+        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis_to_Lean'; mirror that one again"):
             getattr(bpy.ops.qc3d, name)(**({"filepath": "/none/none"} if name == "save_map" else {}))
-        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis→Lean' itself; choose that one"):
+        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis_to_Lean' itself; choose that one"):
             bpy.ops.qc3d.mirror()
         assert state() == before
 
@@ -369,14 +371,14 @@ class TestMirror:
         bake("Lean.L", count=1)
         bake("Lean.R", count=1)
         before = state()
-        with pytest.raises(RuntimeError, match=r"'Basis→Lean\.R' was baked from keys of its own; remove it before"):
-            bpy.ops.qc3d.mirror(slider="Basis→Lean.L")
+        with pytest.raises(RuntimeError, match=r"'Basis_to_Lean\.R' was baked from keys of its own; remove it before"):
+            bpy.ops.qc3d.mirror(slider="Basis_to_Lean.L")
         assert state() == before
-        bpy.ops.qc3d.remove(slider="Basis→Lean.R")
-        assert bpy.ops.qc3d.mirror(slider="Basis→Lean.L") == {"FINISHED"}
+        bpy.ops.qc3d.remove(slider="Basis_to_Lean.R")
+        assert bpy.ops.qc3d.mirror(slider="Basis_to_Lean.L") == {"FINISHED"}
         # With a key of its own, a mirror image can be made from that one instead.
-        assert bpy.ops.qc3d.rebake(slider="Basis→Lean.R") == {"FINISHED"}
-        assert Record.read(even.data.shape_keys).chain_of_slider("Basis→Lean.R").mirror_of == ""
+        assert bpy.ops.qc3d.rebake(slider="Basis_to_Lean.R") == {"FINISHED"}
+        assert Record.read(even.data.shape_keys).chain_of_slider("Basis_to_Lean.R").mirror_of == ""
 
     def test_a_shape_without_symmetry(self, even: bpy.types.Object, state: State) -> None:
         for point in even.data.shape_keys.key_blocks["Basis"].points:

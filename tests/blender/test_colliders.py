@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colliders of a bake: which objects, where they are, and what is said where there are none."""
+"""Colliders of a bake: which objects count, where they are, and the messages if there are none."""
 
 from __future__ import annotations
 
@@ -101,7 +101,9 @@ class TestBake:
         from qc3d_addon.blender.operators import bake_inbetweens
 
         monkeypatch.setattr(bake_inbetweens, "plan_bake", planned)
-        assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders="Off") == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(
+            play_on="slider", from_key="Basis", to_key="Lean", colliders="Off"
+        ) == {'FINISHED'}
         result = Record.read(figure.data.shape_keys).chains[0].result
         assert result.collider_crossings == 0
         ball.location.x = 3.0
@@ -110,12 +112,12 @@ class TestBake:
         first, again = (plan.task.collider for plan in seen)
         moved = again.shapes - first.shapes
         np.testing.assert_allclose(moved, np.broadcast_to([1.0, 0.0, 0.0], moved.shape), atol=1e-5)
-        bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean")
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean")
         assert Record.read(figure.data.shape_keys).chains[0].result.collider_crossings is None
 
     def test_the_panel_names_it_too(self, figure: bpy.types.Object, ball: bpy.types.Object) -> None:
         figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.colliders = "Basis", "Lean", "Off"
-        assert bpy.ops.qc3d.bake_inbetweens() == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(play_on="slider") == {'FINISHED'}
         assert Record.read(figure.data.shape_keys).chains[0].request["colliders"] == "Off"
 
     @pytest.mark.parametrize(
@@ -125,7 +127,7 @@ class TestBake:
         bpy.data.collections.new("Empty").objects.link(figure)
         before = state()
         with pytest.raises(RuntimeError, match=sentence):
-            bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", colliders=name)
+            bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", colliders=name)
         assert state() == before
 
 
@@ -135,7 +137,7 @@ class TestMeanwhile:
     SENTENCE = "The objects of 'Off' were changed meanwhile; re-bake to keep off where they are now."
 
     def notes(self, figure: bpy.types.Object, change: Callable[[], object]) -> tuple[str, ...]:
-        plan = plans.plan_bake(figure, BakeRequest(THROUGH, 1, colliders="Off"))
+        plan = plans.plan_bake(figure, BakeRequest(THROUGH, 1, colliders="Off", play_on="slider"))
         outcome = finish(carry_out(plan.task))
         change()
         bpy.context.view_layer.update()

@@ -11,6 +11,8 @@ import pytest
 
 from qc3d_addon.blender import cli
 
+from ..command_lines import with_others
+
 pytestmark = pytest.mark.usefixtures("quick_map")
 
 
@@ -26,8 +28,8 @@ def command(figure: bpy.types.Object, tmp_path: Path) -> list[str]:
 def test_it_bakes_a_file(command: list[str], tmp_path: Path) -> None:
     assert cli.run_command([*command, "--mode", "linear"]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
-    made = [key.name for key in bpy.data.objects["Figure"].data.shape_keys.key_blocks if "→" in key.name]
-    assert made == ["Basis→Lean 1/3", "Basis→Lean 2/3", "Basis→Lean 3/3"]
+    made = [key.name for key in bpy.data.objects["Figure"].data.shape_keys.key_blocks if "_" in key.name]
+    assert made == ["Lean_33", "Lean_67"]
 
 
 def test_it_keeps_what_the_panel_showed(command: list[str], figure: bpy.types.Object, tmp_path: Path) -> None:
@@ -40,7 +42,7 @@ def test_it_keeps_what_the_panel_showed(command: list[str], figure: bpy.types.Ob
 
 
 def test_it_says_what_is_wrong(command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run_command([*command, "--to", "Grin"]) == 2
+    assert cli.run_command(with_others(command, ["--to", "Grin"])) == 2
     text = capsys.readouterr().err
     assert text == "qc3d: There is no shape key 'Grin'; choose the second key from those of the mesh.\n"
     assert not (tmp_path / "baked.blend").exists()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever cannot be baked: one sentence that says why, and the file exactly as it was."""
+"""Whatever cannot be baked is refused with one sentence that says why, and the file stays exactly as it was."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.keys import shape_keys, slider
+from qc3d_addon.blender.keys import drivers, shape_keys, slider
 from qc3d_addon.solver.errors import MeshingError
 from qc3d_addon.solver.frames import task
 from qc3d_addon.solver.frames.bake import Bake
@@ -203,7 +203,9 @@ def test_meshes_that_span_no_volume_bake(corners: list[tuple[int, int, int]], mo
     obj = object_of(corners)
     lean = obj.data.shape_keys.key_blocks["Lean"]
     lean.points.foreach_set("co", np.add(corners, [0.0, 0.0, 2.0]).astype(np.float32).ravel())
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=1, mode=mode) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean", count=1, mode=mode
+    ) == {'FINISHED'}
     middle = np.empty((len(corners), 3), dtype=np.float32)
     obj.data.shape_keys.key_blocks[2].points.foreach_get("co", middle.ravel())
     np.testing.assert_allclose(middle, np.add(corners, [0.0, 0.0, 1.0]), atol=1e-5)
@@ -222,28 +224,28 @@ class TestLaterFailures:
 
     @pytest.fixture
     def baked(self, figure: bpy.types.Object) -> bpy.types.Object:
-        bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=2)
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=2)
         figure.data.shape_keys.key_blocks["Lean"].points[0].co.x += 0.5
         figure.active_shape_key_index = 4
         return figure
 
     @pytest.fixture
     def bake(self) -> Callable[..., str]:
-        return lambda **choices: refused(bpy.ops.qc3d.bake_inbetweens, **{"count": 5, **choices})
+        return lambda **choices: refused(bpy.ops.qc3d.bake_inbetweens, **{"count": 5, "play_on": "slider", **choices})
 
     def test_a_locked_key_that_would_be_replaced(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str]
     ) -> None:
-        baked.data.shape_keys.key_blocks["Basis→Lean 2/3"].lock_shape = True
+        baked.data.shape_keys.key_blocks["Basis_to_Lean_100"].lock_shape = True
         before = state()
         assert bake() == (
-            "Error: Shape key 'Basis→Lean 2/3' of an earlier bake is locked; unlock it first."
+            "Error: Shape key 'Basis_to_Lean_100' of an earlier bake is locked; unlock it first."
         )
         assert state() == before
 
     def test_a_locked_key_that_is_only_read_is_no_obstacle(self, baked: bpy.types.Object) -> None:
         baked.data.shape_keys.key_blocks["Lean"].lock_shape = True
-        assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean") == {'FINISHED'}
+        assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean") == {'FINISHED'}
 
     def test_a_map_that_is_not_found(
         self, baked: bpy.types.Object, state: State, bake: Callable[..., str], monkeypatch: pytest.MonkeyPatch
@@ -285,8 +287,8 @@ class TestLaterFailures:
         [
             (shape_keys, "set_key_coordinates", 1),
             (shape_keys, "set_key_coordinates", 4),
-            (slider, "drive", 1),
-            (slider, "drive", 5),
+            (drivers, "drive_value", 1),
+            (drivers, "drive_value", 3),
             (slider, "begin_keyframes", 1),
         ],
     )

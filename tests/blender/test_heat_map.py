@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map: attributes that follow the slider, and nothing of it left when it is hidden."""
+"""The heat map: attributes that follow the slider, and nothing left behind when it is hidden."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from qc3d_addon.blender.store import kept_measures
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 Shown = Callable[..., np.ndarray]
 
 
 @pytest.fixture
 def baked(figure: bpy.types.Object) -> bpy.types.Object:
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="linear", count=3) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean", mode="linear", count=3
+    ) == {"FINISHED"}
     return figure
 
 
@@ -127,11 +129,11 @@ def test_a_new_bake_refreshes_it(baked: bpy.types.Object) -> None:
         point.co.z *= 1.5
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
     assert at_vertices(baked.data, "QC3D stretch 4").max() > 1.1 * before.max()
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="linear", count=1)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", mode="linear", count=1)
     assert "QC3D stretch 2" in baked.data.attributes
     assert "QC3D stretch 3" not in baked.data.attributes
     # In-betweens of other keys are none of its business.
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Stretch", mode="linear", count=3)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Stretch", mode="linear", count=3)
     state = heat_map.shown(baked)
     assert state is not None
     assert state.slider == SLIDER
@@ -207,7 +209,7 @@ class TestWorstPlace:
         assert len(middle) == 1
         where = shown(baked)[middle[0]] + np.array([1.0, 2.0, 3.0])
         np.testing.assert_allclose(bpy.context.scene.cursor.location, where, atol=1e-5)
-        assert baked.active_shape_key.name == f"{SLIDER} {round(4 * place)}/4"
+        assert baked.active_shape_key.name == f"{SLIDER}_{25 * round(4 * place)}"
         # The worst edge there is as bad as the panel says.
         keys = {key.name: key for key in mesh.shape_keys.key_blocks}
         shapes = {}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package for this machine, installed as a user does: nothing of ours on the path, a user folder that is empty."""
+"""The package for this platform, installed as by a user: our sources are not on the path, the user folder is empty."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_it_installs_bakes_and_goes_again(package: Path, blender: Path) -> None:
     assert {"QC3D_OT_bake_inbetweens", "QC3D_PT_inbetweens"} <= set(used["added"]["types"])
     assert used["left behind"] == used["left behind after uninstalling"] == {}
     assert used["slow imports"] == []  # enabling must not wait for the libraries
-    keys = ["Basis→Lean 1/3", "Basis→Lean 2/3", "Basis→Lean 3/3"]
+    keys = ["Basis_to_Lean_33", "Basis_to_Lean_67", "Basis_to_Lean_100"]
     for engine in ("tetwild", "delaunay"):
         assert used["baked"][engine]["status"] == ["FINISHED"]
         assert used["baked"][engine]["keys"] == keys

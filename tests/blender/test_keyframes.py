@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The slider's keyframes: made on request, never twice, and never in place of the animator's own."""
+"""Keyframes of the slider: made on request, never twice, and never replacing the animator's own."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import bpy
 import pytest
 
 from qc3d_addon.blender import compat
-from qc3d_addon.blender.keys import slider
+from qc3d_addon.blender.keys.control import slider_path
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean"
-PATH = slider.data_path(SLIDER)
+SLIDER = "Basis_to_Lean"
+PATH = slider_path(SLIDER)
 
 
 def bake(**choices: object) -> None:
     pair = {"from_key": "Basis", "to_key": "Lean"}
-    assert bpy.ops.qc3d.bake_inbetweens(**pair, count=1, mode='linear', **choices) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", **pair, count=1, mode='linear', **choices) == {'FINISHED'}
 
 
 def keyframes(obj: bpy.types.Object) -> list[tuple[float, float]]:
@@ -41,7 +41,7 @@ def test_the_slider_goes_from_the_first_to_the_second_key_at_even_speed(figure: 
         bpy.context.scene.frame_set(frame)
         assert figure[SLIDER] == pytest.approx(value, abs=1e-6)
     bpy.context.scene.frame_set(15)
-    assert figure.data.shape_keys.key_blocks["Basis→Lean 1/2"].value == 1.0
+    assert figure.data.shape_keys.key_blocks["Basis_to_Lean_50"].value == 1.0
 
 
 def test_without_the_request_there_are_none(figure: bpy.types.Object) -> None:
@@ -72,7 +72,7 @@ def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     bake()
     figure[SLIDER] = 0.25
     figure.keyframe_insert(PATH, frame=7)
-    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11)))
+    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11), play_on="slider"))
     assert keyframes(figure) == [(7.0, 0.25)]
     assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps saved from a bake and loaded for the same mesh in another file."""
+"""Maps saved after a bake and loaded for the same mesh in another file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ State = Callable[[], dict[str, Any]]
 
 
 def bake(**choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(mode="linear", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode="linear", **choices) == {"FINISHED"}
 
 
 @pytest.fixture

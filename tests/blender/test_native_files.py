@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a .blend file is all there is found out without opening it."""
+"""A truncated .blend file is detected without opening it."""
 
 from __future__ import annotations
 

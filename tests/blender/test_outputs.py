@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons that write files, attacked as the commands are in tests/attacks/test_outputs.py."""
+"""Buttons that write files, attacked in the same ways as the commands in tests/attacks/test_outputs.py."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def button(request: pytest.FixtureRequest) -> tuple[Write, str]:
 @pytest.fixture(autouse=True)
 def baked(figure: bpy.types.Object, quick_map: list[FitOptions]) -> bpy.types.Object:
     """The figure with in-betweens."""
-    bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=2, mode='linear')
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=2, mode='linear')
     return figure
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel below the choices shows of each bake."""
+"""The part of the panel that shows the results of each bake."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qc3d_addon.blender.ui.panel_results import QC3D_PT_results
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
-SLIDER = "Basis→Lean.L"
+SLIDER = "Basis_to_Lean.L"
 
 
 class Button:
@@ -83,7 +83,9 @@ def even() -> bpy.types.Object:
         for point in key.points:
             point.co.x += lean * max(point.co.z, 0.0) ** 2
     assert not QC3D_PT_results.poll(Context(obj))
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean.L", mode="linear", count=2) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean.L", mode="linear", count=2
+    ) == {"FINISHED"}
     return obj
 
 
@@ -111,7 +113,8 @@ def test_a_bake(even: bpy.types.Object) -> None:
 
 
 def test_a_lost_key_is_said(even: bpy.types.Object) -> None:
-    even.data.shape_keys.key_blocks["Lean.L"].name = "Other"
+    key = even.data.shape_keys.key_blocks["Lean.L"]
+    key.name, key.points[0].co.x = "Other", 7.0  # another name alone would be followed
     sentence = "Shape key 'Lean.L' was renamed or deleted; give it its name back to re-bake, or bake anew."
     assert sentence in drawn(even).texts
 
@@ -127,7 +130,7 @@ def test_a_mirror_image_is_made_again_from_the_other_side(even: bpy.types.Object
     assert {f"Mirrored from {SLIDER}", "2 in-betweens"} < set(layout.texts)
     first = layout.buttons[0]  # the newest is on top
     assert (first[0], first[1].slider) == ("mirror", SLIDER)  # type: ignore[attr-defined]
-    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis→Lean.R"]  # type: ignore[attr-defined]
+    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis_to_Lean.R"]  # type: ignore[attr-defined]
     assert "mirror" not in of_the_image
     assert "rebake" not in of_the_image
 

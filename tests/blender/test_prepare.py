@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map of a pair is made once and kept with the keys: in the file, until a key, the mesh or the settings change."""
+"""Kept fits: a pair is fitted once, and its map stays in the file until a key, the mesh or the settings change."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ PAIR = {"from_key": "Basis", "to_key": "Lean"}
 
 
 def bake(**choices: object) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(**{**PAIR, "count": 1, "mode": 'linear', **choices}) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", **{**PAIR, "count": 1, "mode": 'linear', **choices}
+    ) == {'FINISHED'}
 
 
 def map_properties() -> dict[str, bytes]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of the panel's choices, and the preferences."""
+"""Presets of the panel's options, and the preferences."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registering is quick and leaves nothing behind when taken back."""
+"""Registering the add-on is fast, and unregistering leaves nothing behind."""
 
 from __future__ import annotations
 

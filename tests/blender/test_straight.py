@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mirrored key: refused at once with the offer of the mode *straight*, which bakes, re-bakes and plays."""
+"""A mirrored key is refused at once with the advice to use mode *straight*, which bakes, re-bakes and plays it."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def test_a_mirrored_key_is_refused_with_an_offer(
 ) -> None:
     before = state()
     with pytest.raises(RuntimeError, match=r"mirrored or turned inside out: .* Choose the mode straight"):
-        bpy.ops.qc3d.bake_inbetweens(mode=mode, **CHOICES)
+        bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode=mode, **CHOICES)
     assert state() == before
 
 
 def test_the_straight_blend_is_baked_instead(mirrored: bpy.types.Object, shapes: Shapes, tmp_path: Path) -> None:
-    assert bpy.ops.qc3d.bake_inbetweens(mode='straight', **CHOICES) == {'FINISHED'}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='straight', **CHOICES) == {'FINISHED'}
     made = shapes(mirrored)
     for step in range(1, 4):
         expected = made["Basis"] + step / 4 * (made["Mirrored"] - made["Basis"])
-        np.testing.assert_allclose(made[f"Basis→Mirrored {step}/4"], expected, atol=1e-6)
+        np.testing.assert_allclose(made[f"Basis_to_Mirrored_{25 * step}"], expected, atol=1e-6)
     keys = mirrored.data.shape_keys
     record = Record.read(keys)
     (chain,) = record.chains
@@ -60,11 +60,11 @@ def test_the_straight_blend_is_baked_instead(mirrored: bpy.types.Object, shapes:
 
 def test_a_bake_in_another_mode_takes_its_place(figure: bpy.types.Object) -> None:
     choices = {**CHOICES, "to_key": "Lean"}
-    bpy.ops.qc3d.bake_inbetweens(mode='linear', **choices)
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='linear', **choices)
     bpy.ops.qc3d.heat_map(measure='stretch')
     assert "QC3D" in " ".join(figure.modifiers.keys())
-    bpy.ops.qc3d.bake_inbetweens(mode='straight', **choices)
-    assert not kept_measures.has(figure.data.shape_keys, "Basis→Lean")
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='straight', **choices)
+    assert not kept_measures.has(figure.data.shape_keys, "Basis_to_Lean")
     assert list(figure.modifiers) == []  # the heat map has nothing to show
-    bpy.ops.qc3d.bake_inbetweens(mode='linear', **choices)
-    assert kept_measures.has(figure.data.shape_keys, "Basis→Lean")
+    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='linear', **choices)
+    assert kept_measures.has(figure.data.shape_keys, "Basis_to_Lean")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""As few in-betweens as a tolerance needs, as shape keys."""
+"""A tolerance bakes as few in-betweens as it needs, as shape keys."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.bake.request import DENSE_STEPS
 from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.solver.settings import DENSE_STEPS
 
-SLIDER = "Basis→Bent"
+SLIDER = "Basis_to_Bent"
 ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
 
 pytestmark = pytest.mark.usefixtures("work_here")
@@ -44,6 +44,7 @@ def bar() -> bpy.types.Object:
 
 def bake(tolerance: float) -> None:
     found = bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Bent", use_tolerance=True, tolerance=tolerance, engine='delaunay',
         quality='normal',
     )  # fmt: skip
@@ -63,28 +64,28 @@ def steps(obj: bpy.types.Object) -> int:
 
 def test_smaller_tolerances_need_more_and_both_are_kept(bar: bpy.types.Object, shapes: ReadShapes) -> None:
     counts = []
-    for tolerance in (10.0, 0.05, 0.005):
+    for tolerance in (10.0, 0.05, 0.0005):
         bake(tolerance)
         counts.append(steps(bar))
-        assert DENSE_STEPS % counts[-1] == 0
-    assert counts[0] == 1 < counts[1] < counts[2]
-    coarse = shapes(bar)
-    # What the fine bake shows is near what one of all steps shows.
+    assert counts[0] == 1 < counts[1] < counts[2] < 10
+    (chain,) = Record.read(bar.data.shape_keys).chains
+    few, weights = shapes(bar), chain.weights
+    # What the few play is near what a bake of all has.
     bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Bent", count=DENSE_STEPS - 1, engine="delaunay", quality="normal"
     )
     dense = shapes(bar)
-    stride = DENSE_STEPS // counts[2]
-    kept = [coarse["Basis"]] + [coarse[f"{SLIDER} {step}/{counts[2]}"] for step in range(1, counts[2] + 1)]
-    for step in range(1, DENSE_STEPS):
-        before, part = step // stride, step % stride / stride
-        blend = kept[before] * (1.0 - part) + kept[min(before + 1, counts[2])] * part
-        assert np.linalg.norm(blend - dense[f"{SLIDER} {step}/{DENSE_STEPS}"], axis=1).max() <= 0.005 + 1e-5
+    kept = np.stack([few[chain.keys.get(step, "Basis")] for step in range(len(chain.places))])
+    (chain,) = Record.read(bar.data.shape_keys).chains
+    for step, place in enumerate(chain.places):
+        played = weights.played(kept, [place])[0]
+        assert np.linalg.norm(played - dense[chain.keys.get(step, "Basis")], axis=1).max() <= 0.0005 + 1e-5
 
 
 def test_a_straight_blend_is_enough(bar: bpy.types.Object, shapes: ReadShapes, shown: Callable[..., Any]) -> None:
     bake(100.0)
-    assert [name for name in shapes(bar) if name.startswith(SLIDER)] == [f"{SLIDER} 1/1"]
+    assert [name for name in shapes(bar) if name.startswith(SLIDER)] == [f"{SLIDER}_100"]
     seen = shown(bar, **{SLIDER: 0.5})
     assert np.abs(seen - 0.5 * (shapes(bar)["Basis"] + shapes(bar)["Bent"])).max() < 1e-6
 
@@ -117,7 +118,7 @@ def bake_through(*names: str, **choices: object) -> Chain:
     way = {"from_key": names[0], "via": [{"name": name} for name in names[1:-1]], "to_key": names[-1]}
     # Straight ways at a changing speed, which even steps of the slider show the better the more there are.
     smooth = {"mode": "linear", "easing": "ease-in-out"}
-    assert bpy.ops.qc3d.bake_inbetweens(**way, **smooth, **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", **way, **smooth, **choices) == {"FINISHED"}
     chain = Record.read(bpy.context.active_object.data.shape_keys).chain(names)
     assert chain is not None
     return chain
@@ -125,54 +126,40 @@ def bake_through(*names: str, **choices: object) -> Chain:
 
 @pytest.mark.usefixtures("quick_map")
 def test_no_number_is_enough(figure: bpy.types.Object) -> None:
-    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=1e-5)
-    assert chain.intervals == DENSE_STEPS
-    (note,) = [note for note in chain.result.notes if "tolerance" in note]
-    assert note.startswith("The most in-betweens that a tolerance makes, 47 between every two keys, miss it: vertices")
-    missed = float(note.split("about ")[1].split(" off")[0])
-    chain = bake_through("Basis", "Lean", count=2 * DENSE_STEPS - 1)
-    frames = np.array([positions(figure, chain.keys[step]) for step in range(1, 2 * DENSE_STEPS)])
-    between = frames[2:-1:2] - (frames[1:-2:2] + frames[3::2]) / 2
-    assert np.linalg.norm(between, axis=2).max() == pytest.approx(missed, rel=0.2)
+    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=1e-6, weights="hats")
+    assert chain.intervals > 0.9 * DENSE_STEPS
 
 
 @pytest.mark.usefixtures("quick_map")
-def test_every_two_keys_of_a_chain_keep_it(figure: bpy.types.Object) -> None:
+def test_a_chain_keeps_it_and_meets_every_key(figure: bpy.types.Object) -> None:
     keys = ("Lean", "Basis", "Stretch")
     chain = bake_through(*keys, use_tolerance=True, tolerance=0.01)
     assert not [note for note in chain.result.notes if "tolerance" in note]
-    found = chain.intervals // 2  # the hardest two keys decide
-    assert DENSE_STEPS % found == 0
-    assert 1 < found < DENSE_STEPS
-    sparse = {step: positions(figure, name) for step, name in chain.keys.items()}
-    sparse[found] = positions(figure, "Basis")
+    assert 0.5 in chain.places
+    assert chain.corners == (chain.places.index(0.5),)  # which the mode linear turns at
+    shown = np.stack([positions(figure, chain.keys.get(step, "Basis")) for step in range(len(chain.places))])
+    weights = chain.weights
     chain = bake_through(*keys, use_tolerance=False, count=DENSE_STEPS - 1)
-    dense = {step: positions(figure, name) for step, name in chain.keys.items()}
-    dense[DENSE_STEPS] = positions(figure, "Basis")
-    stride = DENSE_STEPS // found
-    for step, shape in dense.items():
-        before, part = step // stride, step % stride / stride
-        blend = sparse[before] * (1.0 - part) + sparse[min(before + 1, 2 * found)] * part
-        assert np.linalg.norm(blend - shape, axis=1).max() <= 0.01 + 1e-5
+    for step, place in enumerate(chain.places):
+        shape = positions(figure, chain.keys.get(step, "Basis"))
+        assert np.linalg.norm(weights.played(shown, [place])[0] - shape, axis=1).max() <= 0.01 + 1e-5
 
 
 @pytest.mark.usefixtures("quick_map")
-def test_baked_again_the_keys_stay_unless_more_are_needed(figure: bpy.types.Object) -> None:
-    slider = "Basis→Lean"
-    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.01)
+def test_baked_again_the_keys_stay_and_more_come_where_they_are_needed(figure: bpy.types.Object) -> None:
+    slider = "Basis_to_Lean"
+    chain = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.01, weights="hats")
     keys = figure.data.shape_keys.key_blocks
     names = keys.keys()
     bend(figure, 0.1)  # which needs fewer
     assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
     assert keys.keys() == names
-    assert not [note for note in remembered(figure).result.notes if "tolerance" in note]
     bend(figure, 3.0)
     assert bpy.ops.qc3d.rebake(slider=slider) == {"FINISHED"}
     again = remembered(figure)
     assert again.intervals > chain.intervals
-    (note,) = [note for note in again.result.notes if "tolerance" in note]
-    said = f"The tolerance needs {again.intervals - 1} in-betweens between every two keys now, before it were"
-    assert note == f"{said} {chain.intervals - 1}: their shape keys were replaced."
+    assert keys.keys()[: len(names)] == names
     bend(figure, 0.1)
-    few = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.011)  # another one starts from the fewest
+    # Another tolerance starts from the fewest.
+    few = bake_through("Basis", "Lean", use_tolerance=True, tolerance=0.011, weights="hats")
     assert few.intervals < chain.intervals

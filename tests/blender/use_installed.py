@@ -81,10 +81,11 @@ def _bake(engine: str) -> dict[str, object]:
         point.co.x += 0.4 * max(point.co.z, 0.0) ** 2
     start = time.perf_counter()
     status = bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider",
         from_key="Basis", to_key="Lean", count=2, quality='normal', engine=engine, use_keyframes=False
     )
     seconds = time.perf_counter() - start
-    made = [key.name for key in obj.data.shape_keys.key_blocks if "→" in key.name]
+    made = [key.name for key in obj.data.shape_keys.key_blocks if "_to_" in key.name]
     return {"status": sorted(status), "keys": made, "seconds": round(seconds, 1)}
 
 

@@ -1,20 +1,27 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d analyze`` on keys and on meshes, its files, and what it refuses."""
+"""``qc3d analyze`` on keys and on meshes: its files, and its error messages."""
 
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib import image
+from matplotlib import image, pyplot
+from matplotlib.figure import Figure
 from scipy.spatial import Delaunay
 
 from qc3d_addon.cli import main
+from qc3d_addon.solver.maps.analysis import Analysis
 from qc3d_addon.solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
-from qc3d_paper.drawing.slices import cut
+from qc3d_addon.solver.maps.mapping import Mapping
+from qc3d_paper.drawing.shading import upright
+from qc3d_paper.drawing.slices import cut, save_histograms
 
 
 @pytest.fixture
@@ -69,7 +76,7 @@ def test_a_second_file_as_the_target(blob: TetFile, tmp_path: Path) -> None:
     assert summary["dilatation"]["median"] == pytest.approx(2.0, rel=1e-6)
 
 
-def test_two_keys(keys: Path, tmp_path: Path) -> None:
+def test_two_keys(keys: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "out"
     command = ["analyze", str(keys), "--from", "small", "--to", "long", "--engine", "delaunay", "--quality", "normal"]
     assert main.main([*command, "--output", str(folder)]) == 0
@@ -81,6 +88,51 @@ def test_two_keys(keys: Path, tmp_path: Path) -> None:
     with np.load(folder / "surface.npz") as stored:
         assert {"faces", "key0", "key1", "stretch", "volume", "dilatation"} == set(stored.files)
     assert image.imread(folder / "surface.png").std() > 0.05
+    said = capsys.readouterr().out
+    assert len(said.splitlines()) == 1
+    assert said.startswith(f"{summary['tetrahedra']} tetrahedra, 0 folds; volume ratio ")
+    upright = image.imread(folder / "surface.png")
+    assert main.main([*command, "--up", "y", "--output", str(folder)]) == 0
+    assert image.imread(folder / "surface.png").shape != upright.shape or (
+        image.imread(folder / "surface.png") != upright
+    ).any()
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z"])
+def test_the_axis_that_points_up(up: str) -> None:
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    turned = upright(points, up)
+    np.testing.assert_array_equal(turned[:, 2], points[:, "xyz".index(up)])
+    # A rotation: lengths and the volume of three edges stay, with its sign.
+    assert np.linalg.det(turned[:3]) == pytest.approx(np.linalg.det(points[:3]))
+
+
+def test_memory_is_bounded(data_folder: Path, tmp_path: Path) -> None:
+    """In a process of its own: the most that another test has held counts for the whole process."""
+    script = (
+        "import sys; from qc3d_addon.cli import main; from qc3d_addon.solver.support.memory import peak_memory_mb;"
+        "assert main.main(sys.argv[1:]) == 0; print(peak_memory_mb())"
+    )
+    keys = [str(data_folder / "head.npz"), "--from", "neutral", "--to", "jawOpen", "--up", "y"]
+    command = [sys.executable, "-c", script, "analyze", *keys, "--output", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert float(done.stdout.splitlines()[-1]) < 300.0
+
+
+@pytest.mark.parametrize("widest", [1.2, 3.0, 40.0, 1e5])
+def test_labels_of_histograms_keep_apart(widest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.random.default_rng(0).uniform(size=(60, 3))
+    bent = points * np.array([1.0, 1.0, widest]) + points[:, [1, 2, 0]] ** 2 * 0.1
+    figures: list[Figure] = []
+    monkeypatch.setattr(pyplot, "close", figures.append)
+    save_histograms(Analysis(Mapping.checked(points, Delaunay(points).simplices, bent)), tmp_path / "picture.png")
+    for axes in figures[0].axes:
+        low, high = axes.get_xlim()
+        labels = [*axes.get_xticklabels(), *axes.get_xticklabels(minor=True)]
+        seen = [label for label in labels if label.get_text() and low <= label.get_position()[0] <= high]
+        assert len(seen) > 1
+        boxes = sorted((label.get_window_extent() for label in seen), key=lambda box: box.x0)
+        assert all(first.x1 < second.x0 for first, second in pairwise(boxes))
 
 
 class TestErrors:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d bake``: from a .blend file to one with in-betweens, and one sentence where the input is not usable."""
+"""``qc3d bake``: from a .blend file to one with in-betweens, and one sentence for unusable input."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ import pytest
 
 from qc3d_addon.cli import main
 
+from ..command_lines import with_others
+
 QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def bake(file: Path, *more: str) -> int:
     command = ["bake", str(file), "--object", "Bar", "--from", "Basis", "--to", "Bent", "--frames", "2"]
-    return main.main([*command, "--output", "out.blend", *QUICK, *more])
+    command += ["--play-on", "slider"]
+    return main.main(with_others([*command, "--output", "out.blend", *QUICK], more))
 
 
 def test_the_file_gets_its_inbetweens(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,7 +48,7 @@ def test_a_chain_goes_there_and_back(bar_scene: Path, tmp_path: Path, monkeypatc
     assert bake(bar_scene, "--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear") == 0
     report = json.loads(Path("out.json").read_text())
     assert report["via"] == ["Bent"]
-    assert report["keys"] == [f"Basis→Bent→Basis {step}/6" for step in range(1, 6)]
+    assert report["keys"] == [f"Basis_to_Bent_to_Basis_{100 * step / 6:.0f}" for step in range(1, 6)]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
     assert set(report["keys"]) < set(bpy.data.objects["Bar"].data.shape_keys.key_blocks.keys())
 
@@ -111,3 +114,53 @@ def test_files_that_are_no_scene(
     assert "odd.blend" in text
     assert text.count("\n") == 1
     assert not Path("out.blend").exists()
+
+
+def bake_keys(file: Path, *options: str) -> int:
+    return main.main(["bake", str(file), "--output", "out.blend", "--report", "out.json", *QUICK, *options])
+
+
+def test_keys_on_themselves(
+    bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert bake_keys(bar_scene, "--object", "Bar", "--all-keys", "--frames", "2") == 0
+    assert "Bar: Bent: 2 in-betweens" in capsys.readouterr().out
+    (told,) = json.loads(Path("out.json").read_text())["keys"]
+    assert (told["key"], told["ended"], told["report"]["keys"]) == ("Bent", "baked", ["Bent_33", "Bent_67"])
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert "Bent_33" in bpy.data.objects["Bar"].data.shape_keys.key_blocks
+    assert bake_keys(Path("out.blend"), "--all-objects", "--on-key", "Bent", "--tolerance", "0.001") == 0
+    report = json.loads(Path("out.json").read_text())
+    assert list(report) == ["Bar"]  # all that has two keys
+    assert report["Bar"]["keys"][0]["report"]["count"] >= 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--object", "Bar", "--on-key", "Grin"], "no shape key 'Grin' on 'Bar'"),
+        (["--object", "Bar", "--on-key", "Basis"], "'Basis' cannot play in-betweens"),
+        (["--object", "Bar"], "Name the keys in one way"),
+        (["--object", "Bar", "--all-keys", "--on-key", "Bent"], "Name the keys in one way"),
+        (["--object", "Bar", "--all-keys", "--to", "Bent"], "Name the keys in one way"),
+        (["--object", "Bar", "--from", "Basis"], "required: --from, --to"),
+        (["--all-keys"], "ne of the arguments --object --all-objects is required"),
+        (["--object", "Bar", "--all-keys", "--frames", "2", "--frames", "3"], "--frames: it is given twice"),
+        (["--object", "Bar", "--all-keys", "--frames", "2", "--tolerance", "3"], "not allowed with argument --frames"),
+        (["--object", "Bar", "--all-keys", "--tolerance", "0"], "it must be a distance above 0"),
+        (["--object", "Bar", "--all-keys", "--keyframes", "1", "2"], "neither --keyframes nor"),
+    ],
+)
+def test_unusable_options_of_many_keys(
+    options: list[str],
+    said: str,
+    bar_scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert bake_keys(bar_scene, *options) == 2
+    assert said in capsys.readouterr().err
+    assert os.listdir() == []

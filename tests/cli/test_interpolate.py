@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d interpolate``: frames that meet their keys, and one sentence where the input is not usable."""
+"""``qc3d interpolate``: frames that meet their keys, and one sentence for unusable input."""
 
 from __future__ import annotations
 
@@ -16,15 +16,19 @@ import pytest
 
 from qc3d_addon.cli import interpolate as command
 from qc3d_addon.cli import main
+from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames.task import Task
+from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.settings import FitOptions, FrameOptions
+
+from ..command_lines import with_others
 
 QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
 
 def interpolate(pair: Path, output: Path, *more: str, first: str = "straight", second: str = "bent") -> int:
     command = ["interpolate", str(pair), "--from", first, "--to", second, "--frames", "1", "--output", str(output)]
-    return main.main([*command, *QUICK, *more])
+    return main.main(with_others([*command, *QUICK], more))
 
 
 def refusal(capsys: pytest.CaptureFixture[str]) -> str:
@@ -264,3 +268,44 @@ def test_version(capsys: pytest.CaptureFixture[str], repository: Path) -> None:
     assert ended.value.code == 0
     version = capsys.readouterr().out.removeprefix("qc3d ").strip()
     assert f'version = "{version}"' in (repository / "blender_manifest.toml").read_text()
+
+
+class TestPolygonsAndHalves:
+    def test_polygons_in_the_file(self, bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+        half = len(bar["faces"]) // 2
+        labels = np.tile(np.arange(half), 2)
+        order = np.argsort(labels, kind="stable")
+        loops = np.concatenate([bar["faces"][:half], bar["faces"][half:, 2:]], axis=1)
+        path = tmp_path / "quads.npz"
+        np.savez(path, **bar | {"faces": bar["faces"][order], "polygons": labels[order]})
+        labelled = read_pairs(path, ("straight", "bent"))["straight", "bent"]
+        filled = np.pad(loops, ((0, 0), (0, 2)), constant_values=-1)
+        np.savez(path, **bar | {"faces": bar["faces"][order], "polygons": filled})
+        listed = read_pairs(path, ("straight", "bent"))["straight", "bent"]
+        assert len(np.unique(labelled.polygons)) == half
+        assert np.array_equal(labelled.polygons, listed.polygons)
+
+    @pytest.mark.parametrize(
+        "polygons", [np.zeros(3, dtype=int), np.zeros((5, 4), dtype=int), np.array("x"), np.ones(4)]
+    )
+    def test_polygons_that_are_none(self, bar: dict[str, np.ndarray], tmp_path: Path, polygons: np.ndarray) -> None:
+        path = tmp_path / "spoiled.npz"
+        np.savez(path, **bar, polygons=polygons)
+        with pytest.raises(InputError, match="polygons"):
+            read_pairs(path, ("straight", "bent"))
+
+    def test_a_half(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (-1, 1) for z in (-1, 1)])
+        quads = np.array([[4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+        faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        moved = corners * [1.0, 1.0, 1.5] + [0.0, 0.5, 0.0]
+        np.savez(tmp_path / "half.npz", faces=faces, shape_names=np.array(["a", "b"]), V0=corners, V1=moved)
+        ends = ["--from", "a", "--to", "b", "--frames", "1", "--output", str(tmp_path / "out.npz")]
+        assert main.main(["interpolate", str(tmp_path / "half.npz"), *ends]) == 0
+        assert "mirror image across a plane; 4 vertices" in capsys.readouterr().err
+        with np.load(tmp_path / "out.npz") as out:
+            assert out["frames"].shape == (3, 8, 3)
+            assert np.array_equal(out["faces"], faces)
+            assert not out["frames"][:, :4, 0].any()
+        assert main.main(["interpolate", str(tmp_path / "half.npz"), *ends, "--mirror", "none"]) == 0
+        assert "mirror image" not in capsys.readouterr().err

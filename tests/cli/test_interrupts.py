@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C and the system's request to end, at every stage of the command line: one sentence, and nothing was written."""
+"""Ctrl-C and SIGTERM at every stage of the command line: one sentence, and nothing written."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One bar for each stage on a terminal, silence elsewhere."""
+"""Progress bars: one for each stage on a terminal, none elsewhere."""
 
 from __future__ import annotations
 

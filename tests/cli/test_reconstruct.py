@@ -1,15 +1,18 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d reconstruct`` on files of every kind it reads, and what it says of those it cannot."""
+"""``qc3d reconstruct`` with every kind of input file, and its error messages."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 
 from qc3d_addon.cli import main
+from qc3d_addon.cli.landmarks import read_landmarks
+from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.maps.files import EIGEN_FORM, STRETCH, TARGET, TetFile, read_tets, write_tets
 from qc3d_addon.solver.maps.mapping import Mapping
 from qc3d_addon.solver.maps.representation import eigen_form, upper_triangle
@@ -91,7 +94,66 @@ def test_folds_are_told(mapping: Mapping, tmp_path: Path, capsys: pytest.Capture
     write_tets(source, content(mapping))
     output = tmp_path / "rebuilt.npz"
     assert main.main(["reconstruct", str(source), "--landmarks", str(landmarks), "--output", str(output)]) == 0
-    assert f"{read_tets(output).mapping().folds} of 162 tetrahedra are folded" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert f"{read_tets(output).mapping().folds} of 162 tetrahedra are folded" in said.err
+    assert said.out.startswith(f"162 tetrahedra rebuilt, {read_tets(output).mapping().folds} folds; volume ratio ")
+    assert len(said.out.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        b"vertex,x,y,z\n{},,0.4,\n",
+        b"\xef\xbb\xbfVertex;X;Y;Z\r\n{};;0,4;\r\n;;;\r\n",
+        b"sep=;\r\nVERTEX;X;Y;Z;\r\n{};;0,4;;\r\n",
+        b"\xff\xfe" + "y\tvertex\tz\tx\r\n0,4\t{}\t\t\r\n".encode("utf-16-le"),
+    ],
+    ids=["plain", "mark and semicolons", "separator named", "utf-16 and tabs"],
+)
+def test_landmarks_of_spreadsheets(mapping: Mapping, tmp_path: Path, table: bytes) -> None:
+    inside = int(np.flatnonzero(~mapping.mesh.on_cube_face.any(axis=1))[0])
+    wide = table.startswith(b"\xff\xfe")
+    number = str(inside).encode("utf-16-le" if wide else "ascii")
+    (tmp_path / "table.csv").write_bytes(table.replace("{}".encode("utf-16-le" if wide else "ascii"), number))
+    vertices, values = read_landmarks(tmp_path / "table.csv")
+    assert vertices.tolist() == [inside]
+    np.testing.assert_array_equal(values, [[np.nan, 0.4, np.nan]])
+
+
+@pytest.mark.parametrize("ending", ["stl", "off", "ply", "obj", "inp", "su2", "svg", "unknown"])
+def test_formats_without_room_are_refused_before_the_work(
+    mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str], ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, output = tmp_path / "map.npz", tmp_path / f"rebuilt.{ending}"
+    write_tets(source, content(mapping))
+    monkeypatch.setattr("qc3d_addon.cli.reconstruct.reconstruct", None)
+    assert main.main(["reconstruct", str(source), "--output", str(output)]) == 2
+    assert f"rebuilt.{ending} cannot be written: " in capsys.readouterr().err
+    assert not output.exists()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_tets(output, content(mapping))
+
+
+def test_what_is_beside_the_tetrahedra(mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = mapping.mesh
+    cells = [("tetra", mesh.tets), ("triangle", mesh.boundary_faces[:5]), ("line", mesh.boundary_faces[:2, :2])]
+    per_cell = {STRETCH: [upper_triangle(mapping.stretch), np.zeros((5, 6)), np.zeros((2, 6))]}
+    meshio.Mesh(mesh.points, cells, cell_data=per_cell).write(tmp_path / "surface.vtu")
+    output = tmp_path / "rebuilt.npz"
+    assert main.main(["reconstruct", str(tmp_path / "surface.vtu"), "--output", str(output)]) == 0
+    assert np.abs(read_tets(output).mapping().values - mapping.values).max() < EXACT
+    assert "Left out, since they have no volume: cells of the types 5 triangle, 2 line." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("kind", "corners"), [("hexahedron", 8), ("wedge", 6), ("pyramid", 5), ("tetra10", 10)])
+def test_other_cells_of_the_volume_are_refused(
+    mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, corners: int
+) -> None:
+    mesh = mapping.mesh
+    cells = [("tetra", mesh.tets), (kind, np.arange(2 * corners).reshape(2, corners))]
+    meshio.Mesh(mesh.points, cells).write(tmp_path / "mixed.vtu")
+    assert main.main(["reconstruct", str(tmp_path / "mixed.vtu"), "--output", str(tmp_path / "out.npz")]) == 2
+    assert f"has cells beside its tetrahedra (2 {kind})" in capsys.readouterr().err
 
 
 class TestErrors:
@@ -103,7 +165,7 @@ class TestErrors:
         source = tmp_path / "map.npz"
         write_tets(source, TetFile(mapping.mesh.points, mapping.mesh.tets))
         said = self.run(capsys, source, "--output", tmp_path / "out.npz")
-        assert "has no array 'stretch' of the tetrahedra; it has none" in said
+        assert "has no array 'stretch' of its 162 tetrahedra; it has none" in said
         assert not (tmp_path / "out.npz").exists()
 
     @pytest.mark.parametrize(
@@ -126,6 +188,32 @@ class TestErrors:
         write_tets(source, TetFile(mapping.mesh.points, mapping.mesh.tets, {}, {STRETCH: numbers}))
         assert sentence in self.run(capsys, source, "--output", tmp_path / "out.npz")
 
+    @pytest.mark.parametrize("rows", [64, 161])
+    def test_arrays_of_a_wrong_length(
+        self, mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: int
+    ) -> None:
+        source = tmp_path / "map.npz"
+        arrays = {"points": mapping.mesh.points, "tets": mapping.mesh.tets}
+        np.savez(source, **arrays, stretch=np.ones((rows, 6)))
+        said = self.run(capsys, source, "--output", tmp_path / "out.npz")
+        assert f"'stretch' has the shape ({rows}, 6); the mesh needs a row for each of its 162 tetrahedra" in said
+        np.savez(source, **arrays, stretch=content(mapping).at_tets[STRETCH], target=np.ones((63, 3)))
+        said = self.run(capsys, source, "--boundary", "fixed", "--output", tmp_path / "out.npz")
+        assert "'target' has the shape (63, 3); the mesh needs a row for each of its 64 vertices" in said
+
+    def test_a_landmark_against_the_boundary(
+        self, mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        source, landmarks = tmp_path / "map.npz", tmp_path / "landmarks.csv"
+        write_tets(source, content(mapping))
+        corner = int(np.flatnonzero((mapping.mesh.points == [1.0, 0.0, 1.0]).all(axis=1))[0])
+        landmarks.write_text(f"vertex,x,y,z\n{corner},1,0.25,1\n")
+        said = self.run(capsys, source, "--landmarks", landmarks, "--output", tmp_path / "out.npz")
+        assert f"The landmark at vertex {corner} wants y at 0.25, where the boundary holds it at 0;" in said
+        landmarks.write_text(f"vertex,x,y,z\n{corner},1,0.0000000000,1\n")
+        command = ["reconstruct", str(source), "--landmarks", str(landmarks), "--output", str(tmp_path / "out.npz")]
+        assert main.main(command) == 0
+
     def test_a_free_boundary_without_landmarks(
         self, mapping: Mapping, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -137,7 +225,10 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("text", "sentence"),
         [
-            ("", "must begin with the row"),
+            ("", "is empty; it must begin with the row"),
+            ("vertex,x,y\n1,2,3\n", "begins with vertex,x,y; it must begin"),
+            ("vertex,x,y,z\n1.5,0,0,0\n", "1.5 is no number of a vertex"),
+            ("vertex;x;y;z\n1;0;0;0;7\n", "row 2: four cells are needed"),
             ("vertex,x,y,z\n", "names no landmarks"),
             ("vertex,x,y,z\n1,2,3\n", "row 2: four cells are needed"),
             ("vertex,x,y,z\n1,2,3,b\n", "row 2: could not convert"),

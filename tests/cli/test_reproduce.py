@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d reproduce``: pictures and captions, and what the demo files measure."""
+"""``qc3d reproduce``: its pictures and captions, and the figures measured on the demo files."""
 
 from __future__ import annotations
 

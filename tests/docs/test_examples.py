@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Examples in documentation and docstrings do what they show."""
+"""The examples in documentation and docstrings give the output that they show."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the documentation names in the code is there."""
+"""Modules and names that the documentation mentions exist."""
 
 from __future__ import annotations
 

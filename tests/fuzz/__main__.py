@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m tests.fuzz --cases 2000 --seed 1``: half of the cases are meshes, half are files; crashes are printed."""
+"""``python -m tests.fuzz --cases 2000 --seed 1``: half of the cases are meshes, half files; prints crashes."""
 
 from __future__ import annotations
 

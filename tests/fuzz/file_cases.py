@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of every kind that is read, damaged or made up."""
+"""Damaged and invented files of every kind that is read."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with two keys or three as nobody would make them, and what must hold of every bake."""
+"""Absurd meshes with two or three keys, and what must hold for every bake."""
 
 from __future__ import annotations
 

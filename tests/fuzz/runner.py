@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs cases in a child process with limits, and goes on with the next case where the child does not survive one."""
+"""Runs cases in a child process with limits; after a crash, goes on with the next case."""
 
 from __future__ import annotations
 

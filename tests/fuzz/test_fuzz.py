@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A quick part of the fuzz run, other cases each time; ``python -m tests.fuzz`` runs thousands."""
+"""A short fuzz run with different cases each time; ``python -m tests.fuzz`` runs thousands."""
 
 from __future__ import annotations
 

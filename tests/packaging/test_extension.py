@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The builder of extension packages, on small wheels made here: what a package holds, and what fails the build."""
+"""The builder of extension packages, with small wheels made here: contents of packages, and what fails a build."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One version, and a wheel that holds the package and nothing else."""
+"""A single version number, and a wheel with the packages and nothing else."""
 
 from __future__ import annotations
 

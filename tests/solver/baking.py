@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests bake with: engines that can run here, frames from fits that are there already."""
+"""Helpers for tests that bake: engines that work here, and frames of stored fits."""
 
 from __future__ import annotations
 

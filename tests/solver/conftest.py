@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures of the solver's tests: tetrahedral meshes of the cube, made once, of every kind."""
+"""Fixtures of the solver's tests: tetrahedral meshes of the cube of every kind, made once."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small meshes and maps with known answers, for the tests of the solver."""
+"""Small meshes and maps with known properties, for the solver's tests."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def icosphere(subdivisions: int, radius: float = 0.3) -> tuple[Floats, Ints]:
 
 
 def box_surface(cells: tuple[int, int, int], size: tuple[float, float, float]) -> tuple[Floats, Ints]:
-    """The surface of a box centred on the z axis that stands on z = 0; triangles with normals pointing out."""
+    """The surface of a box centered on the z axis that stands on z = 0; triangles with normals pointing out."""
     quads = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3

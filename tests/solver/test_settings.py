@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options are checked when they are made: their types as well as their ranges."""
+"""Options are validated when they are made: types as well as ranges."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as they come: every kind of unclean mesh bakes, in both modes, or is refused with a sentence."""
+"""Meshes as they come: every kind of unclean mesh bakes in all modes, or is refused with a sentence."""
 
 from __future__ import annotations
 

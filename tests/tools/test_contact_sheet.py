@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a contact sheet: what is covered, what hides what, and rows of equal size."""
+"""Contact sheets and moving pictures: covered pixels, hidden surfaces, rows of equal size, there and back."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib import image
+from PIL import Image
 
 import contact_sheet
 from qc3d_addon.cli import main
@@ -75,6 +77,36 @@ def test_a_sheet_of_frames_beside_the_straight_blend(bar: dict[str, np.ndarray],
     columns = np.array_split(mine, 4, axis=1)
     assert all(np.ptp(column) > 0.3 for column in columns)
     assert np.abs(columns[0] - columns[3][:, : columns[0].shape[1]]).max() > 0.3
+
+
+def test_a_moving_picture_goes_to_the_last_key_and_back(bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+    times = np.linspace(0.0, 1.0, 4)
+    frames = np.stack([(1.0 - t) * bar["V0"] + t * bar["V1"] for t in times])
+    np.savez(tmp_path / "frames.npz", faces=bar["faces"], times=times, frames=frames)
+    row, moving = str(tmp_path / "frames.npz"), tmp_path / "moving.gif"
+    contact_sheet.main([f"mine={row}", "--straight", "--height", "60", "--view", "front", "--output", str(moving)])
+    with Image.open(moving) as picture:
+        shown = []
+        for number in range(picture.n_frames):
+            picture.seek(number)
+            shown.append(np.asarray(picture.convert("RGB"), dtype=np.float64))
+    assert len(shown) == 6
+    np.testing.assert_array_equal(shown[1], shown[5])
+    steps = [np.abs(after - before).max() for before, after in pairwise(shown[:4])]
+    assert min(steps) > 50.0
+    width = shown[0].shape[1] // 2
+    # Below the labels; these frames are the straight blend.
+    np.testing.assert_array_equal(shown[1][30:, :width], shown[1][30:, width:])
+
+
+def test_a_moving_picture_needs_rows_of_equal_length(bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+    for name, count in (("few", 2), ("many", 3)):
+        frames = np.stack([bar["V0"], *[bar["V1"]] * (count - 1)])
+        np.savez(tmp_path / f"{name}.npz", faces=bar["faces"], times=np.linspace(0.0, 1.0, count), frames=frames)
+    rows = [str(tmp_path / f"{name}.npz") for name in ("few", "many")]
+    with pytest.raises(SystemExit, match="different numbers of frames"):
+        contact_sheet.main([*rows, "--output", str(tmp_path / "moving.gif")])
+    assert not (tmp_path / "moving.gif").exists()
 
 
 @pytest.mark.parametrize("through", [["Basis", "Bent"], ["Basis", "Bent", "Basis"]])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests ask of the arm, sent to Blender after ``remote.py``."""
+"""Queries about the arm of the demo file, sent to Blender after ``remote.py``."""
 
 import hashlib
 import sys

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender with its window for the tests of a module, and in it, for each test, the arm of the demo file."""
+"""A Blender with a window for the tests of a module, and for each test the arm of the demo file in it."""
 
 from __future__ import annotations
 
@@ -48,6 +48,7 @@ def open_arm(window: Window, repository: Path) -> None:
     window.ask(
         f"""
 bpy.context.view_layer.objects.active = arm()
+arm().qc3d.play_on, arm().qc3d.count = "slider", 3
 arm().qc3d.from_key, arm().qc3d.to_key = {FROM!r}, {TO!r}
 view()[1].spaces.active.shading.type = 'WIREFRAME'
 view()[1].spaces.active.overlay.show_overlays = False

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A real Blender in a window on a screen of its own, used from outside with mouse and keyboard, and asked in Python.
+"""A real Blender in a window on a virtual screen, operated with mouse and keyboard and queried in Python.
 
-It runs in a folder with a whole system to chroot into: Blender, scipy, Xvfb, xdotool, ImageMagick and software OpenGL,
-with /proc and /dev mounted. That needs root.
+It runs in a folder with a complete system to chroot into: Blender, scipy, Xvfb, xdotool, ImageMagick and software
+OpenGL, with /proc and /dev mounted. That needs root.
 """
 
 from __future__ import annotations
@@ -271,7 +271,7 @@ class Window:
 
 @contextlib.contextmanager
 def redraws(window: Window) -> Iterator[list[float]]:
-    """Redraw the 3D view as often as Blender can; afterwards the list holds the seconds between the redraws."""
+    """Redraw the 3D view as often as Blender can; afterward the list holds the seconds between the redraws."""
     gaps: list[float] = []
     window.ask("counter = Redraws()")
     try:

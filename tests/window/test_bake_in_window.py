@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake from the panel's button, watched, cancelled, finished, undone, redone and made again."""
+"""A bake started from the panel's button: watched, canceled, finished, undone, redone and repeated."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .harness import Window, is_alive, paused, redraws
 
 BAKE, CANCEL, REBAKE = "qc3d.bake_inbetweens", "qc3d.cancel", "qc3d.rebake"
 OWN = ["Basis", "Bend 90", "Twist 120", "Bend and twist"]
-MADE = [f"Basis→Bend and twist {step}/4" for step in (1, 2, 3, 4)]
-BAR = np.array([71, 114, 179])  # the colour of Blender's progress bars
+MADE = [f"Basis_to_Bend and twist_{25 * step}" for step in (1, 2, 3, 4)]
+BAR = np.array([71, 114, 179])  # the color of Blender's progress bars
 
 
 def start(window: Window) -> int:
@@ -116,6 +116,6 @@ def test_a_bake_is_one_step_to_undo_and_can_be_made_again(window: Window) -> Non
     assert again[:2] == sculpted[:2]
     assert again[3:] == sculpted[3:]
     assert again[2] != sculpted[2]
-    assert window.ask("points('Bend and twist').tolist() == points('Basis→Bend and twist 4/4').tolist()")
+    assert window.ask("points('Bend and twist').tolist() == points('Basis_to_Bend and twist_100').tolist()")
     window.press("ctrl+z")
     window.wait_for(f"state() == {sculpted}")

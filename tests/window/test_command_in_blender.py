@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender --background --command qc3d``: Ctrl-C, which Blender without its window keeps from Python, ends it."""
+"""``blender --background --command qc3d``: Ctrl-C ends it, although Blender without a window hides it from Python."""
 
 from __future__ import annotations
 

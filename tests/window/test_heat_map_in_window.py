@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map in a window: its button, its legend, its menu, undo, and what the view showed before."""
+"""The heat map in a window: its button, legend and menu, undo, and the restored view."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator may do while a bake is at work: nothing crashes, and a sentence says what became of it."""
+"""What an animator may do while a bake runs: nothing crashes, and a sentence says what became of the bake."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_there_is_never_more_than_one_bake(window: Window) -> None:
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
         window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('INVOKE_DEFAULT')")
     with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
-        window.ask("bpy.ops.qc3d.bake_inbetweens(from_key='Basis', to_key='Bend 90')")
+        window.ask("bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Bend 90')")
     assert window.ask("child()") == child
     window.press("Escape")
     window.wait_for("job() is None")
@@ -124,8 +124,8 @@ def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
 @pytest.mark.parametrize(
     ("ending", "sentence"),
     [
-        (signal.SIGKILL, "The process that does the work was ended by SIGKILL; memory may have run out"),
-        (signal.SIGSEGV, "The process that does the work was ended by SIGSEGV"),
+        (signal.SIGKILL, "The background process was ended by SIGKILL; memory may have run out"),
+        (signal.SIGSEGV, "The background process was ended by SIGSEGV"),
         (signal.SIGSTOP, "The work was stopped after its time limit"),
     ],
 )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel of a file that something else has changed: it is drawn, says what is wrong, and its button helps."""
+"""The panel of a damaged file: it draws, says what is wrong, and its button repairs it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from .harness import Window
 
-SLIDER = "Basis→Bend and twist"
+SLIDER = "Basis_to_Bend and twist"
 
 
 @pytest.fixture

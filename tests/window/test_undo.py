@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo and redo of every operator, and undo while a bake is at work: each is one step, and nothing is half undone."""
+"""Undo and redo of all operators, and undo during a bake: each is a single step, and nothing is half undone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from .harness import Window, paused
 from .test_interruptions import CHANGED, start
 
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 
 # A ball that is symmetric, and everything in the file that an operator may change.
 BALL = """
@@ -23,6 +23,7 @@ for name, lean in (('Basis', 0.0), ('Lean', 0.4), ('Tilt', -0.3)):
     key.value = 0.0
     for point in key.points:
         point.co.x += lean * max(point.co.z, 0.0) ** 2
+ball.qc3d.play_on = 'slider'
 ball.qc3d.from_key, ball.qc3d.to_key, ball.qc3d.count = 'Basis', 'Lean', 2
 
 def points_of(key):
@@ -46,7 +47,7 @@ def everything():
         found['keys'].append([blocks, drivers, stored, bool(animation and animation.action)])
     found['attributes'] = [a.name for a in bpy.data.objects['Ball'].data.attributes if 'QC3D' in a.name]
     found['nodes'] = len(bpy.data.node_groups)
-    found['slider'] = bpy.data.objects['Ball'].get('Basis→Lean')
+    found['slider'] = bpy.data.objects['Ball'].get('Basis_to_Lean')
     return found
 
 remember('Ball')
@@ -191,10 +192,10 @@ def test_an_earlier_bake_is_undone_while_the_next_one_works(window: Window) -> N
         window.press("ctrl+z", "ctrl+z")
         window.wait_for(f"names() == {before}")
     window.wait_for("job() is None")
-    made = [f"Basis→Bend 90 {step}/4" for step in (1, 2, 3, 4)]
+    made = [f"Basis_to_Bend 90_{25 * step}" for step in (1, 2, 3, 4)]
     window.wait_for(f"names() == {before + made}")
     chains = "json.loads(arm().data.shape_keys['qc3d'])['chains']"
-    assert window.ask(f"import json\n[chain['slider'] for chain in {chains}]") == ["Basis→Bend 90"]
+    assert window.ask(f"import json\n[chain['slider'] for chain in {chains}]") == ["Basis_to_Bend 90"]
     window.press("ctrl+z")
     window.wait_for(f"names() == {before}")
 

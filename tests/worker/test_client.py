@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""However the child process ends: one typed error with one sentence, no process and no folder left."""
+"""However the child process ends, there is one typed error with one sentence, and no process or folder is left."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def failure(limits: Limits | None = None) -> QC3DError:
     with pytest.raises(QC3DError) as caught:
         client.run(small_task(), None, limits)
     assert "\n" not in str(caught.value)
-    assert str(caught.value).endswith(".") or "Its last words" in str(caught.value)
+    assert str(caught.value).endswith(".") or "Its last message" in str(caught.value)
     return caught.value
 
 
@@ -123,8 +123,8 @@ GARBAGE = [
         ("os._exit(0)", r"ended without a result \(exit status 0\)"),
         ("ctypes.CDLL(None).exit(0)", r"ended without a result \(exit status 0\)"),
         ("sys.exit(3)", r"ended without a result \(exit status 3\)"),
-        ("1 / 0", r"exit status 1.*Its last words: ZeroDivisionError"),
-        ("import no_such_module", r"exit status 1.*Its last words: ModuleNotFoundError"),
+        ("1 / 0", r"exit status 1.*Its last message: ZeroDivisionError"),
+        ("import no_such_module", r"exit status 1.*Its last message: ModuleNotFoundError"),
         ("os.write(1, b'{\"done\": tr')", r"ended without a result \(exit status 0\)"),
         (f"{DONE}; os.abort()", "was ended by SIGABRT"),
         (f"{DONE}; os._exit(1)", "exit status 1"),
@@ -144,7 +144,7 @@ def test_each_ending_is_one_error(stand_in: Path, temporary: Path, line: str, sa
 @pytest.mark.parametrize("after", ["time.sleep(600)", "os._exit(0)"])
 def test_garbage_among_the_messages(stand_in: Path, temporary: Path, line: str, after: str) -> None:
     play(stand_in, line, after)
-    assert "sent something that is no message of it and was stopped" in str(failure())
+    assert "sent invalid data and was stopped" in str(failure())
     assert list(temporary.iterdir()) == []
 
 
@@ -241,7 +241,7 @@ class TestTheRealChild:
         monkeypatch.setattr(Task, "require_memory", lambda *_: None)  # as where the estimate is too low
         with pytest.raises(WorkerError, match=f"not enough memory within its limit of {megabytes} MB; use fewer") as e:
             client.run(small_task("finest"), None, Limits(memory_mb=megabytes))
-        assert "allow it more in the add-on's preferences" in str(e.value)
+        assert "raise the limit in the add-on's preferences" in str(e.value)
         assert list(temporary.iterdir()) == []
 
     def test_too_large_a_task_is_refused_before_it_starts(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same mesh, keys, settings and kept map give the same frames bit for bit, in whatever process."""
+"""The same mesh, keys, settings and kept map give bit-identical frames in any process."""
 
 from __future__ import annotations
 

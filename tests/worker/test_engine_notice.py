@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sentence that says which engine does the work. Stand-ins play the compiled module."""
+"""The sentence that names the engine in use, with stand-ins for the compiled module."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_module_that_does_not_load_is_said(monkeypatch: pytest.MonkeyPatch, tm
     broken.write_bytes(b"for another system")
     monkeypatch.setattr(tetwild_loading, "_wrapper", lambda: broken)
     reason = "its compiled module does not load on this system"
-    assert settled() == f"The engine delaunay does the work here, since tetwild cannot: {reason}."
+    assert settled() == f"The engine delaunay is used here, because tetwild cannot run: {reason}."
 
 
 def test_a_missing_module_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

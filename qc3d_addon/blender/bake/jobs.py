@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Job:
-    """A task at work in a child process, as the panel shows it.
+    """A task at work in a child process, as the panel shows it: one of a row of tasks, counted from 0.
 
     Raises
     ------
@@ -28,10 +28,11 @@ class Job:
         If the child process cannot be started.
     """
 
-    def __init__(self, label: str, task: Task, limits: Limits) -> None:
+    def __init__(self, label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1) -> None:
         from ...worker.client import Worker
 
-        self.label = label
+        self.label = f"{label} ({part + 1} of {parts})" if parts > 1 else label
+        self._part, self._parts = part, parts
         self.is_cancelled = False
         self._started = clock.monotonic()
         self._worker: Any = Worker(task, limits)
@@ -54,7 +55,8 @@ class Job:
     @property
     def fraction(self) -> float:
         """How much of all the work is done, 0..1."""
-        return 0.0 if self._worker.progress is None else self._worker.progress.overall
+        own = 0.0 if self._worker.progress is None else self._worker.progress.overall
+        return (self._part + own) / self._parts
 
     def at_end(self, call: Callable[[], None]) -> None:
         """Call this when the job ends, in whatever way: Blender drops a running operator without asking it."""
@@ -74,8 +76,8 @@ def current() -> Job | None:
     return _current
 
 
-def begin(label: str, task: Task, limits: Limits) -> Job:
-    """Start a job; there is never more than one.
+def begin(label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1) -> Job:
+    """Start a job, or one of a row of them; there is never more than one at work.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def begin(label: str, task: Task, limits: Limits) -> Job:
 
     if _current is not None:
         raise InputError(busy_problem() or "")
-    _current = Job(label, task, limits)
+    _current = Job(label, task, limits, part, parts)
     return _current
 
 

@@ -38,7 +38,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     if not needs_fits(request.frame_options.mode):
         raise InputError("A straight blend is made without a map; bake in another mode to have one.")
     maps = {}
-    for ends, pair in mesh_data.read_pairs(obj, chain.through).items():
+    for ends, pair in mesh_data.read_pairs(obj, chain.through, chain.base).items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
         if data is None or why_unusable(data) is not None:
             raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is no more that of the keys; re-bake first.")

@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ...solver.frames.easing import eased
-from ..keys import shape_keys, slider
+from ..keys import chain_keys, chain_shapes, shape_keys
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
+from ..store.renames import digest
 from ..store.summaries import Summary
 from . import bookkeeping, colliders
 from .request import PREVIEW_STEPS, BakeRequest, BakeResult
-from .step_choice import chosen_steps
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome, Task
@@ -76,7 +74,8 @@ class Plan:
             raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
         checks.require_object(obj)
         try:
-            pairs = mesh_data.read_pairs(obj, self.request.keys)
+            checks.require_control(obj.data.shape_keys, self.request.keys, self.request.base)
+            pairs = mesh_data.read_pairs(obj, self.request.keys, self.request.base)
         except InputError as error:
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. {error}") from error
         if not all(_same(pair, self.task.pairs[ends]) for ends, pair in pairs.items()):
@@ -110,14 +109,23 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     """
     # Imported where it is used: scipy would make Blender start slower.
     from ...solver.fit.storage import why_unusable
-    from ...solver.frames.bake import evenly_spaced
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
     keys = obj.data.shape_keys
     record = Record.read(keys)
-    pairs = mesh_data.read_pairs(obj, request.keys)
-    shape_keys.require_writable(obj, _chain(obj, record, request), request.keyframes)
+    checks.require_keys(keys, request.keys)
+    if request.play_on == "auto":
+        on_key = checks.control_problem(keys, request.keys, request.keys[0]) is None
+        request = replace(request, play_on="key" if on_key else "slider")
+    checks.require_control(keys, request.keys, request.base)
+    pairs = mesh_data.read_pairs(obj, request.keys, request.base)
+    chain = _chain(obj, record, request)
+    shape_keys.require_writable(obj, chain, request.keyframes)
+    play = request.play_options
+    if play.tolerance > 0.0 and chain.request.get("tolerance") == play.tolerance:
+        # Baked again with the same tolerance a chain does not lose steps, so that its keys can stay.
+        play = replace(play, also_at=(*play.also_at, *chain.places[1:-1]))
     usable, notes = {}, []
     for ends, pair in pairs.items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
@@ -126,9 +134,10 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
             notes.append(f"The map that was kept from '{ends[0]}' to '{ends[1]}' {problem} and was made again.")
         elif data is not None:
             usable[ends] = data
-    times = evenly_spaced(request.intervals - 1)
     collider = colliders.read_colliders(obj, request.colliders, request.keys)
-    task = Task(pairs, request.keys, request.fit_options, request.frame_options, times, usable, collider)
+    task = Task(
+        pairs, request.keys, request.fit_options, request.frame_options, kept=usable, collider=collider, play=play
+    )
     return Plan(request, task, obj.session_uid, obj.name, tuple(notes))
 
 
@@ -154,11 +163,14 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     InputError
         If the object or the keys cannot be used any more.
     """
+    from ...solver.frames.bake import evenly_spaced
+
     request = request_again(obj, chain)
-    slider.require(shape_keys.slider_owner(obj, chain), chain.slider)
+    chain_keys.control_of(obj, chain).require()
+    plan = plan_bake(obj, request)
+    times = evenly_spaced(PREVIEW_STEPS * (len(request.keys) - 1) - 1)
     even = replace(request.frame_options, easing="linear")
-    plan = plan_bake(obj, replace(request, count=PREVIEW_STEPS - 1, tolerance=0.0, frame_options=even))
-    return replace(plan, request=request)
+    return replace(plan, task=replace(plan.task, frame_options=even, times=times, play=None))
 
 
 def write_maps(plan: Plan, outcome: Outcome) -> None:
@@ -187,39 +199,47 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     """
     obj, request, bake = plan.find_object(), plan.request, outcome.bake
     assert bake is not None
+    played = bake.report.played
+    assert played is not None
     keys = obj.data.shape_keys
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
-    chosen, thinned = chosen_steps(bake, request, chain)
-    intervals, times = len(chosen) - 1, bake.times[chosen]
-    met, passed = _keys_on_the_way(times, request)
-    shapes = shape_keys.shapes_by_step(obj, met, bake.frames[chosen])
+    steps = shape_keys.Steps(tuple(bake.times.tolist()), tuple(played.corners))
+    if chain.on_key:
+        shapes = chain_shapes.offsets_by_step(obj, steps.places, bake.frames)
+    else:
+        shapes = chain_shapes.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
 
-    with shape_keys.chain_written(obj, chain, shapes, intervals, request.keyframes) as (undo, said):
-        owner = shape_keys.slider_owner(obj, chain).name
-        notes = [*plan.notes, *bake.report.notes, *said, *thinned, *passed]
+    with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
+        control = chain_keys.control_of(obj, chain)
+        owner = obj.name if control.is_key else control.owner.name
+        notes = [*plan.notes, *bake.report.notes, *said]
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
-        notes += _values_that_add(keys, request)
+        notes += [] if control.is_key else _values_that_add(keys, request)
+        if obj.show_only_shape_key:
+            notes.append(f"'{obj.name}' shows its active key only; unpin that to see the in-betweens play.")
         report = {
             "object": obj.name,
             "from": request.keys[0],
             "via": list(request.keys[1:-1]),
             "to": request.keys[-1],
-            "count": intervals // (len(request.keys) - 1) - 1,
+            "count": len(steps.places) - len(request.keys),
+            "places": list(steps.places),
             "keys": list(chain.keys.values()),
-            "slider": chain.slider,
+            "slider": control.name,
+            "on_key": chain.on_key,
             "slider_object": owner,
             **bake.report.as_json(),
             "notes": notes,
         }
         chain.request, chain.mirror_of = request.remembered(), ""
-        chain.result = Summary.of_report(bake.report, bake.times, chosen, notes)
+        chain.digests = tuple(digest(keys.key_blocks[name]) for name in request.keys)
+        chain.result = Summary.of_report(bake.report, steps.places, notes)
         record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
         _keep_maps(keys, record, plan, outcome, undo)
-        measures = {name: values[chosen] for name, values in bake.measures.items()}
-        bookkeeping.remember(obj, record, chain, measures, undo)
-        result = BakeResult(chain.slider, owner, tuple(chain.keys.values()), tuple(notes), report)
+        bookkeeping.remember(obj, record, chain, bake.measures, undo)
+        result = BakeResult(control.name, owner, tuple(chain.keys.values()), tuple(notes), report)
     return result
 
 
@@ -231,7 +251,8 @@ def kept_map(ends: tuple[str, str], pair: KeyPair, options: FitOptions) -> KeptM
 
 
 def _same(pair: KeyPair, read: KeyPair) -> bool:
-    return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in ("key0", "key1", "faces", "edges"))
+    arrays = ("key0", "key1", "faces", "edges", "polygons")
+    return all(np.array_equal(getattr(pair, name), getattr(read, name)) for name in arrays)
 
 
 def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome, undo: ExitStack) -> None:
@@ -241,32 +262,23 @@ def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
     """The entry of these keys in the record, made where there is none."""
-    chain = record.chain(request.keys)
+    on_key = request.keys[-1] if request.play_on == "key" else ""
+    chain = record.chain_on_key(on_key) if on_key else record.chain(request.keys)
     if chain is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
-        chain = Chain(request.keys, names.chain_label(request.keys, taken))
+        chain = Chain(request.keys, names.chain_label((on_key,) if on_key else request.keys, taken), on_key=on_key)
         record.chains.append(chain)
+    chain.through = request.keys
     return chain
 
 
-def _keys_on_the_way(times: NDArray[np.float64], request: BakeRequest) -> tuple[dict[int, str], list[str]]:
-    """Which step shows which of the request's keys, and a sentence for each key that the slider passes between steps.
+def _steps_of_keys(places: tuple[float, ...], request: BakeRequest) -> dict[int, str]:
+    """Which step shows which of the request's keys."""
+    from ...solver.frames.easing import uneased
 
-    The steps are even on the slider, also where the way between the keys is eased.
-    """
-    along = eased(times, request.frame_options.easing) * (len(request.keys) - 1)
-    met, sentences = {}, []
-    for number, name in enumerate(request.keys):
-        step = int(np.abs(along - number).argmin())
-        if abs(along[step] - number) < 1e-9:
-            met[step] = name
-        else:
-            sentences.append(
-                f"With the easing {request.frame_options.easing} the slider passes '{name}' between two in-betweens, "
-                f"at {np.interp(number, along, times):.2f}; to meet it, bake with the easing linear and ease the "
-                "slider's keyframes."
-            )
-    return met, sentences
+    at_keys = uneased(np.linspace(0.0, 1.0, len(request.keys)), request.frame_options.easing)
+    steps = np.abs(np.array(places)[:, None] - at_keys).argmin(axis=0)
+    return dict(zip(steps.tolist(), request.keys, strict=True))
 
 
 def _values_that_add(keys: bpy.types.Key, request: BakeRequest) -> list[str]:

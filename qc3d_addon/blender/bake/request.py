@@ -5,18 +5,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import Any, Literal, get_args
 
 from ...solver.errors import InputError
-from ...solver.settings import FitOptions, FrameOptions
+from ...solver.settings import DENSE_STEPS, FitOptions, FrameOptions, PlayOptions, WeightKind
 from ..store import names
 from ..store import stored_values as stored
 
-# Frames of every two keys that a tolerance chooses from; it has many divisors.
-DENSE_STEPS = 48
 # Frames of every two keys that a preview is a spline through. It missed the others by at most 6.5e-6 of the size, where
 # benchmarks/scrub.py measured it.
 PREVIEW_STEPS = 24
+
+PlayOn = Literal["auto", "key", "slider"]
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,25 @@ class BakeRequest:
         is then not looked at.
     colliders
         Name of a collection with objects that the in-betweens must not touch, or empty.
+    weights
+        What is played between the in-betweens: ``smooth``, or ``hats`` for straight blends.
+    play_on
+        What plays them: the ``key``'s own value, which needs the first key to be what the last is relative to, a
+        ``slider`` of their own, or ``auto``: the key where it can be.
+    also_at
+        Places of more in-betweens, each between 0 and 1 on the control.
     """
 
     keys: tuple[str, ...]
-    count: int = 3
+    count: int = 5
     fit_options: FitOptions = field(default_factory=FitOptions)
     frame_options: FrameOptions = field(default_factory=FrameOptions)
     keyframes: tuple[int, int] | None = None
     tolerance: float = 0.0
     colliders: str = ""
+    weights: WeightKind = "smooth"
+    also_at: tuple[float, ...] = ()
+    play_on: PlayOn = "auto"
 
     def __post_init__(self) -> None:
         if len(self.keys) < 2:
@@ -61,11 +71,14 @@ class BakeRequest:
         if self.keyframes is not None and self.keyframes[0] >= self.keyframes[1]:
             first, last = self.keyframes
             raise InputError(f"Keyframes from {first} to {last} are not possible; the last must come after the first.")
+        if self.play_on not in get_args(PlayOn):
+            raise InputError(f"Unknown control {self.play_on!r}; choose one of {', '.join(get_args(PlayOn))}.")
+        _ = self.play_options  # refused here where it is not possible
 
     @property
-    def intervals(self) -> int:
-        """Number of steps to compute from the first key to the last."""
-        return (DENSE_STEPS if self.tolerance > 0.0 else self.count + 1) * (len(self.keys) - 1)
+    def play_options(self) -> PlayOptions:
+        """How a control is to play the motion."""
+        return PlayOptions(self.count, self.tolerance, self.weights, self.also_at)
 
     def remembered(self) -> dict[str, Any]:
         """What another bake of the same keys needs to know, as plain values."""
@@ -74,7 +87,15 @@ class BakeRequest:
             "tolerance": self.tolerance,
             "settings": asdict(self.fit_options) | asdict(self.frame_options),
             "colliders": self.colliders,
+            "weights": self.weights,
+            "also_at": list(self.also_at),
+            "play_on": self.play_on,
         }
+
+    @property
+    def base(self) -> str:
+        """Name of the key that the one which plays the in-betweens is relative to; empty where a slider does."""
+        return self.keys[0] if self.play_on == "key" else ""
 
     @classmethod
     def again(cls, keys: tuple[str, ...], remembered: dict[str, Any]) -> BakeRequest:
@@ -95,6 +116,9 @@ class BakeRequest:
                 frame_options,
                 tolerance=stored.number(remembered["tolerance"], 0.0),
                 colliders=stored.text(remembered.get("colliders", "")),
+                weights=remembered.get("weights", "hats"),  # all that earlier versions knew
+                also_at=tuple(stored.number(place) for place in stored.plain_list(remembered.get("also_at", []))),
+                play_on=remembered.get("play_on", "slider"),
             )
         except (KeyError, TypeError, ValueError, InputError) as error:
             raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
@@ -107,9 +131,9 @@ class BakeResult:
     Parameters
     ----------
     slider
-        Name of the custom property that plays the chain.
+        Name of the custom property that plays the chain, or of the key.
     slider_object
-        Name of the object that has it.
+        Name of the object.
     keys
         Names of the generated shape keys, from the first key to the last.
     notes
@@ -127,8 +151,8 @@ class BakeResult:
     def summary(self) -> str:
         """One sentence: what was made and where the slider is."""
         seconds = sum(self.report["seconds"].values())
-        total = self.report["count"] * (len(self.report["via"]) + 1)
+        plays = f"'{self.slider}'" if self.report["on_key"] else f"the slider '{self.slider}'"
         return (
-            f"{total} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
-            f"the slider is '{self.slider}' on '{self.slider_object}'."
+            f"{self.report['count']} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
+            f"{plays} on '{self.slider_object}' plays them."
         )

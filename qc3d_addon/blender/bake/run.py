@@ -6,23 +6,27 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import bpy
 
 from ...solver.errors import InputError
 from .. import native_files
-from .plan import plan_bake, write_bake
+from ..store import checks
+from .many import Verdict, bake_keys, bakeable_keys
+from .plan import Plan, plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 
 if TYPE_CHECKING:
+    from ...solver.frames.task import Outcome
     from ...solver.support.progress import Progress
 
 _TIMES_THE_SIZE = 4  # of the file that was opened, which may be compressed, for what the bake adds besides keys
 
 OnProgress = Callable[["Progress"], None]
+Result = TypeVar("Result")
 
 
 def bake_object(
@@ -47,15 +51,42 @@ def bake_object(
     return write_bake(plan, finish(carry_out(plan.task), on_progress))
 
 
+def bake_object_keys(
+    obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, on_progress: OnProgress | None = None
+) -> list[Verdict]:
+    """Bake keys of an object, each on itself, in this process.
+
+    Parameters
+    ----------
+    names
+        Of the keys; empty for all.
+    choices
+        Everything but the keys.
+
+    Raises
+    ------
+    QC3DError
+        If the object or a name cannot be used; a key that cannot be baked only has a verdict that says so.
+    """
+    from ...solver.frames.task import carry_out
+    from ...solver.support.memory import machine_limit_mb
+    from ...solver.support.progress import finish
+
+    def work(plan: Plan, number: int) -> Outcome:
+        plan.task.require_memory(machine_limit_mb())
+        return finish(carry_out(plan.task), on_progress)
+
+    return bake_keys(obj, names or bakeable_keys(obj), choices, work)
+
+
 def bake_file(
     path: Path,
-    object_name: str,
-    request: BakeRequest,
+    object_names: Sequence[str],
+    work: Callable[[bpy.types.Object], tuple[Result, object]],
     output: Path,
     report: Path | None = None,
-    on_progress: OnProgress | None = None,
-) -> BakeResult:
-    """Bake one object of a .blend file and save the result as another file.
+) -> list[Result]:
+    """Bake objects of a .blend file and save the result as another file.
 
     The file is opened in this process, in place of what is open in it; scripts in it do not run.
 
@@ -63,19 +94,19 @@ def bake_file(
     ----------
     path
         The .blend file to open.
-    object_name
-        Name of the object to bake.
-    request
-        What to bake.
+    object_names
+        Names of the objects to bake; empty for all meshes with two shape keys or more.
+    work
+        Bakes one of them; gives what to return of it and, as plain values, what to report.
     output
         The .blend file to write; it may be the same as ``path``.
     report
-        A JSON file to write the report to, or None.
+        A JSON file to write the report to, or None: that of the object, or of several by their names.
 
     Raises
     ------
     QC3DError
-        If a file, the object, the keys or the settings cannot be used; no file is written.
+        If a file, an object, the keys or the settings cannot be used; no file is written.
     """
     from ...solver.files.atomic import replacing_all, require_writable
 
@@ -84,17 +115,31 @@ def bake_file(
     require_writable(*reports, inputs=[path])
     _open(path)
     size = path.stat().st_size
-    obj = bpy.data.objects.get(object_name)
-    if obj is None:
-        meshes = ", ".join(f"'{other.name}'" for other in bpy.data.objects if other.type == 'MESH') or "none"
-        raise InputError(f"{path} has no object '{object_name}'; its meshes: {meshes}.")
-    result = bake_object(obj, request, on_progress)
+    objects = _objects(path, object_names)
+    done = {obj.name: work(obj) for obj in objects}
+    told = [values for _, values in done.values()]
+    values = told[0] if len(object_names) == 1 else dict(zip(done, told, strict=True))
     # Beside their places: Blender writes the paths of images and libraries relative to the file's own folder.
     with replacing_all(output, *reports, beside=True) as (unfinished, *unfinished_reports):
-        _save(unfinished, output, _TIMES_THE_SIZE * size + _bytes_of_keys(obj))
+        _save(unfinished, output, _TIMES_THE_SIZE * size + sum(map(_bytes_of_keys, objects)))
         for unfinished_report in unfinished_reports:
-            unfinished_report.write_text(json.dumps(result.report, indent=1) + "\n", encoding="utf-8")
-    return result
+            unfinished_report.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    return [result for result, _ in done.values()]
+
+
+def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
+    """The objects of these names, or all meshes with keys that do not share their mesh with one before."""
+    meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH']
+    for name in names:
+        if name not in bpy.data.objects:
+            known = ", ".join(f"'{obj.name}'" for obj in meshes) or "none"
+            raise InputError(f"{path} has no object '{name}'; its meshes: {known}.")
+    if names:
+        return [bpy.data.objects[name] for name in dict.fromkeys(names)]
+    found = {obj.data: obj for obj in reversed(meshes) if checks.object_problem(obj) is None}
+    if not found:
+        raise InputError(f"{path} has no mesh with two shape keys that can be baked; add some.")
+    return list(reversed(found.values()))
 
 
 def _save(new: Path, output: Path, size: int) -> None:

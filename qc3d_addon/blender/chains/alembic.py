@@ -12,7 +12,7 @@ import bpy
 from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
-from ..keys import shape_keys, slider
+from ..keys import chain_keys, drivers, slider
 from ..store.records import Chain
 from .absolute_copy import copied
 
@@ -32,7 +32,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         If the file cannot be written; what was there is kept.
     """
     scene, layer = context.scene, context.view_layer
-    owner = shape_keys.slider_owner(obj, chain)
+    control = chain_keys.control_of(obj, chain)
     with ExitStack() as undo:
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
         undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
@@ -42,11 +42,15 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         scene.collection.children.link(collection)
         collection.objects.link(copy)
         copy.animation_data_clear()
-        copy[chain.slider] = 0.0
-        for driver in slider.driven_by(copy.data.shape_keys, chain.slider).values():
-            if driver.variables[0].targets[0].id == owner:
-                driver.variables[0].targets[0].id = copy
-        curve = compat.ensure_fcurve(copy, slider.data_path(chain.slider), undo)
+        played = control.of(copy.data.shape_keys if control.is_key else copy)
+        if control.is_key:
+            copy.data.shape_keys.driver_remove(control.path)
+        else:
+            copy[chain.slider] = 0.0
+            for driven in drivers.driven_by(copy.data.shape_keys, control.path).values():
+                if drivers.reads(driven.driver, control):
+                    driven.driver.variables[0].targets[0].id = copy
+        curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))

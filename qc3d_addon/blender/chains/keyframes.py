@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from .. import compat
 from ..bake import bookkeeping
-from ..keys import shape_keys, slider
+from ..keys import chain_keys, drivers, shape_keys
+from ..keys.control import Control, value_path
 from ..store.records import Chain, Record
 from . import remove
 
 
-def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str, frames: range) -> NDArray[np.float64]:
-    """(k,) where a slider is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
+def positions(context: bpy.types.Context, control: Control, frames: range) -> NDArray[np.float64]:
+    """(k,) where a control is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
 
     Raises
     ------
@@ -31,17 +32,12 @@ def slider_values(context: bpy.types.Context, owner: bpy.types.Object, name: str
     try:
         for frame in frames:
             scene.frame_set(frame)
-            evaluated = owner.evaluated_get(context.evaluated_depsgraph_get())
-            slider.require(evaluated, name)
-            values.append(float(evaluated[name]))
+            evaluated = control.of(control.owner.evaluated_get(context.evaluated_depsgraph_get()))
+            evaluated.require()
+            values.append(evaluated.value)
     finally:
         scene.frame_set(current, subframe=part)
     return np.array(values)
-
-
-def key_values(chain: Chain, step: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k,) values of the key at a step where the slider is at ``places`` (k,): what its driver gives."""
-    return np.maximum(0.0, 1.0 - np.abs(np.clip(places, -1.0, 2.0) * chain.intervals - step))
 
 
 def bake_to_keyframes(
@@ -59,23 +55,24 @@ def bake_to_keyframes(
         If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
     """
     keys = obj.data.shape_keys
-    owner = shape_keys.require_removable(obj, chain)
+    control = shape_keys.require_removable(obj, chain)
     shape_keys.require_action(keys)
-    slider.require(owner, chain.slider)
-    places = slider_values(context, owner, chain.slider, frames)
-    owned = shape_keys.owned_keys(keys, chain)
+    control.require()
+    # As far as keys can go; what is infinite has no weights.
+    values = chain.weights.at(np.clip(positions(context, control, frames), -10.0, 10.0)).clip(-10.0, 10.0)
+    owned = chain_keys.owned_keys(keys, chain)
     notes, animated = [], []
     with ExitStack() as undo:
         for step, key in owned.items():
-            curve = compat.ensure_fcurve(keys, slider.value_path(key.name), undo)
+            curve = compat.ensure_fcurve(keys, value_path(key.name), undo)
             if len(curve.keyframe_points):
                 notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
-            animated.append((key, curve, key_values(chain, step, places)))
+            animated.append((key, curve, values[:, step]))
         bookkeeping.forget(keys, record, chain, undo)
         undo.pop_all()
     _put_in_place(animated, np.array(frames, dtype=np.float64))
     remove.hide_heat_map(obj, chain)
-    notes += remove.remove_slider(owner, chain)
+    notes += remove.remove_slider(control, chain)
     keys.update_tag()
     context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
     return notes
@@ -86,7 +83,7 @@ def _put_in_place(
 ) -> None:
     """Let curves with these values at ``frames`` do what the drivers of keys did."""
     for key, curve, values in animated:
-        slider.undrive(key)
+        drivers.undrive(key)
         _set_keyframes(curve, frames, values)
         key.value = float(values[0])
 

@@ -12,15 +12,19 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ..bake import bookkeeping
-from ..keys import shape_keys
+from ..keys import chain_keys, shape_keys
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
 
+_SAME = 1e-4  # of the size: keys that were mirrored by other tools are rounded
+
 
 def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
-    """Make the mirror image of a chain, with its own keys and slider; one made before is brought up to date.
+    """Make the mirror image of a chain, with keys of its own; one made before is brought up to date.
+
+    What a key's value plays goes onto the value of the key that is its mirror image; anything else gets a slider.
 
     Every vertex goes where the mirror image of its partner goes, bit for bit. The sides in the keys' names, such as
     ".L", are flipped; names without a side get "mirrored" behind them.
@@ -36,7 +40,8 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
     keys = obj.data.shape_keys
-    steps = shape_keys.all_owned_keys(keys, chain)
+    steps = chain_keys.all_owned_keys(keys, chain)
+    base = chain_keys.base_key(keys, chain).name
     rest = key_coordinates(obj, keys.reference_key.name)
     ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
     obj.data.edges.foreach_get("vertices", ends)
@@ -46,24 +51,41 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
     if through == chain.through:
-        through = (*through[:-1], f"{through[-1]} mirrored")
-    mirrored = record.chain(through)
+        if chain.on_key:
+            raise InputError(f"'{chain.on_key}' has no side in its name, such as .L; its mirror image is not known.")
+        through = (*through[:-1], f"{through[-1]}_mirrored")
+    on_key = through[-1] if chain.on_key else ""
+    if on_key:
+        shape = key_coordinates(obj, chain.on_key)[partners] * flipped
+        _require_mirror_image(obj, on_key, shape, base)
+    mirrored = record.chain_on_key(on_key) if on_key else record.chain(through)
     if mirrored is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
-        mirrored = Chain(through, names.chain_label(through, taken))
+        mirrored = Chain(through, names.chain_label((on_key,) if on_key else through, taken), on_key=on_key)
         record.chains.append(mirrored)
     elif mirrored.result and not mirrored.mirror_of:
         raise InputError(
             f"'{mirrored.slider}' was baked from keys of its own; remove it before it is made from '{chain.slider}'."
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
-    with shape_keys.chain_written(obj, mirrored, shapes, chain.intervals, None) as (undo, _):
+    places = shape_keys.Steps(chain.places, chain.corners)
+    with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
         bookkeeping.remember(obj, record, mirrored, measures, undo)
     return mirrored
+
+
+def _require_mirror_image(obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str) -> None:
+    """Raise InputError unless the key of that name has this shape and is relative to ``base``."""
+    key = obj.data.shape_keys.key_blocks.get(name)
+    if key is None:
+        raise InputError(f"There is no key '{name}' for the mirror image; mirror the key first.")
+    size = float(np.ptp(shape, axis=0).max())
+    if key.relative_key.name != base or np.abs(key_coordinates(obj, name) - shape).max() > _SAME * size:
+        raise InputError(f"'{name}' is not the mirror image of the other side's key; bake it by itself.")
 
 
 def _mirrored_result(result: Summary | None, partners: NDArray[np.int64]) -> Summary | None:

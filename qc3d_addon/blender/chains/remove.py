@@ -12,7 +12,8 @@ import bpy
 from .. import compat
 from ..bake import bookkeeping
 from ..heat_map import heat_map
-from ..keys import shape_keys, slider
+from ..keys import chain_keys, drivers, shape_keys
+from ..keys.control import Control
 from ..store.records import Chain, Record
 
 
@@ -28,27 +29,28 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     InputError
         If a key is locked, or the slider's object or its action is linked; nothing was removed.
     """
-    owner = shape_keys.require_removable(obj, chain)
+    control = shape_keys.require_removable(obj, chain)
     hide_heat_map(obj, chain)
-    shape_keys.remove_keys(obj, list(shape_keys.owned_keys(obj.data.shape_keys, chain).values()))
-    notes = remove_slider(owner, chain)
+    shape_keys.remove_keys(obj, list(chain_keys.owned_keys(obj.data.shape_keys, chain).values()))
+    notes = remove_slider(control, chain)
     with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
         bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
         undo.pop_all()
     return notes
 
 
-def remove_slider(owner: bpy.types.Object, chain: Chain) -> list[str]:
+def remove_slider(control: Control, chain: Chain) -> list[str]:
     """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
-    if chain.slider not in owner:
+    owner = control.owner
+    if control.is_key or not control.is_there:  # a key is the user's own
         return []
-    if not slider.is_number(owner, chain.slider):
+    if not control.is_number:
         return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
-    readers = sum(1 for curve in _drivers() if slider.reads(curve.driver, owner, chain.slider))
+    readers = sum(1 for curve in _drivers() if drivers.reads(curve.driver, control))
     if readers:
         what = "driver reads" if readers == 1 else "drivers read"
         return [f"The slider '{chain.slider}' stays, since {readers} {what} it."]
-    path = slider.data_path(chain.slider)
+    path = control.path
     notes = []
     if compat.find_fcurve(owner, path) is not None:
         if chain.keyframes is not None:

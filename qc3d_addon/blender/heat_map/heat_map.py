@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from .. import compat
-from ..keys import slider
-from ..keys.shape_keys import slider_owner
+from ..keys import drivers
+from ..keys.chain_keys import control_of
+from ..keys.control import Control
 from ..store import id_properties, kept_measures
 from ..store import stored_values as stored
 from ..store.kept_measures import MEASURES
@@ -65,8 +66,8 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
     measures = kept_measures.read(mesh.shape_keys, chain.slider, len(mesh.vertices))
     if measures is None or len(measures[measure]) != chain.intervals + 1:
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them first.")
-    owner = slider_owner(obj, chain)
-    slider.require(owner, chain.slider)
+    control = control_of(obj, chain)
+    control.require()
     if NAME in obj.modifiers and _modifier(obj) is None:
         raise InputError(f"'{obj.name}' has another modifier of the name '{NAME}'; rename that first.")
     scale = scale_of(measure, measures[measure])
@@ -83,7 +84,7 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
         tree = bpy.data.node_groups.new(NAME, 'GeometryNodeTree')
         undo.callback(bpy.data.node_groups.remove, tree)
         _make_nodes(tree, measure, scale)
-        _drive(tree, owner, chain)
+        _drive(tree, control, chain)
         id_properties.put(obj, _STATE, json.dumps(state), undo)
         modifier = _modifier(obj)
         if modifier is None:
@@ -259,8 +260,7 @@ def _colour(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale)
     return ramp.outputs[0]
 
 
-def _drive(tree: bpy.types.NodeTree, owner: bpy.types.Object, chain: Chain) -> None:
-    """Let the node "Slider" follow the slider, counted in steps."""
+def _drive(tree: bpy.types.NodeTree, control: Control, chain: Chain) -> None:
+    """Let the node "Slider" follow the control, counted in steps."""
     curve = compat.new_driver(tree, 'nodes["Slider"].outputs[0].default_value')
-    slider.read_slider(curve.driver, owner, chain.slider)
-    curve.driver.expression = f"min(max({slider.VARIABLE}, 0), 1) * {chain.intervals}"
+    drivers.drive_position(curve, control, chain.places, range(len(chain.places)))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -24,19 +25,38 @@ _TICK = 0.05  # seconds between looks at the child process
 class ChildWork:
     """Plan the work, let a child process do it, write its outcome; an operator says how by ``plan`` and ``write``.
 
+    One that has several plans names the next by ``following``, and writes all by ``write_all``.
+
     From a button it is a modal operator that Esc ends; called by a script, or without a window, it runs to its end.
     Nothing is written unless all of the work was done.
     """
 
     bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
-    def plan(self, context: bpy.types.Context) -> Plan:
-        """What to compute; raises QC3DError where it cannot be done."""
+    def plan(self, context: bpy.types.Context) -> Plan | None:
+        """What to compute, None where nothing is to be; raises QC3DError where it cannot be done."""
         raise NotImplementedError
 
     def write(self, plan: Plan, outcome: Outcome) -> list[str]:
         """Put what came of it into the file; sentences for the user, the last of them what was done."""
         raise NotImplementedError
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """Which of how many plans is at work, counted from 0."""
+        return (0, 1)
+
+    def following(self, context: bpy.types.Context, plan: Plan, outcome: Outcome | QC3DError) -> Plan | None:
+        """What to compute after this; None at the end."""
+        return None
+
+    def write_all(self, plan: Plan | None, outcome: Outcome | QC3DError | None) -> list[str]:
+        """Put everything into the file after the last plan's outcome; raises QC3DError where nothing was written."""
+        if isinstance(outcome, QC3DError):
+            raise outcome
+        assert plan is not None
+        assert outcome is not None
+        return self.write(plan, outcome)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ...worker import client
@@ -46,18 +66,27 @@ class ChildWork:
             problem = jobs.busy_problem()
             if problem is not None:
                 raise_input(problem)
-            plan = self.plan(context)
+            following = self.plan(context)
+            plan: Plan | None = None
+            outcome: Outcome | QC3DError | None = None
 
             def show(reached: Progress) -> None:
-                manager.progress_update(reached.overall)
+                part, parts = self.part
+                manager.progress_update((part + reached.overall) / parts)
 
             manager.progress_begin(0.0, 1.0)
             try:
-                with compat.interruptible():
-                    outcome = client.run(plan.task, show, preferences.limits(context))
+                while following is not None:
+                    plan = following
+                    try:
+                        with compat.interruptible():
+                            outcome = client.run(plan.task, show, preferences.limits(context))
+                    except QC3DError as error:
+                        outcome = error
+                    following = self.following(context, plan, outcome)
             finally:
                 manager.progress_end()
-            return self._finish(plan, outcome)
+            return self._finish(self.write_all(plan, outcome))
         except KeyboardInterrupt:
             self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
             return {'CANCELLED'}
@@ -68,17 +97,7 @@ class ChildWork:
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        try:
-            self._plan = self.plan(context)
-            self._job = jobs.begin(self.bl_label, self._plan.task, preferences.limits(context))
-        except QC3DError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        self._job.at_end(partial(_leave_window, timer))
-        context.window_manager.modal_handler_add(self)
-        self._show(context)
-        return {'RUNNING_MODAL'}
+        return self._guarded(context, lambda: self._begin(context, self.plan(context)))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == 'ESC' and event.value == 'PRESS':
@@ -88,13 +107,12 @@ class ChildWork:
             return {'CANCELLED'}
         if event.type != 'TIMER':
             return {'PASS_THROUGH'}
+        return self._guarded(context, lambda: self._step(context))
+
+    def _guarded(self, context: bpy.types.Context, work: Callable[[], set[str]]) -> set[str]:
+        """Do a part of the work; where it cannot be done, say why and leave nothing running."""
         try:
-            outcome = self._job.poll()
-            if outcome is None:
-                self._show(context)
-                return {'PASS_THROUGH'}
-            jobs.end()
-            return self._finish(self._plan, outcome)
+            return work()
         except QC3DError as error:
             jobs.end()
             self.report({'ERROR'}, str(error))
@@ -103,12 +121,48 @@ class ChildWork:
             jobs.end()  # else no other could ever start
             raise
 
+    def _begin(self, context: bpy.types.Context, plan: Plan | None) -> set[str]:
+        """Start the work of the first plan."""
+        if plan is None:
+            return self._finish(self.write_all(None, None))
+        problem = jobs.busy_problem()
+        if problem is not None:
+            self.report({'ERROR'}, problem)
+            return {'CANCELLED'}
+        self._start(context, plan)
+        context.window_manager.modal_handler_add(self)
+        self._show(context)
+        return {'RUNNING_MODAL'}
+
+    def _start(self, context: bpy.types.Context, plan: Plan) -> None:
+        self._plan = plan
+        self._job = jobs.begin(self.bl_label, plan.task, preferences.limits(context), *self.part)
+        timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._job.at_end(partial(_leave_window, timer))
+
+    def _step(self, context: bpy.types.Context) -> set[str]:
+        """Look at the child process; go on with the next plan, or to the end."""
+        outcome: Outcome | QC3DError | None
+        try:
+            outcome = self._job.poll()
+        except QC3DError as error:
+            outcome = error
+        if outcome is None:
+            self._show(context)
+            return {'PASS_THROUGH'}
+        jobs.end()
+        following = self.following(context, self._plan, outcome)
+        if following is None:
+            return self._finish(self.write_all(self._plan, outcome))
+        self._start(context, following)
+        return {'PASS_THROUGH'}
+
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
         jobs.cancel()
 
-    def _finish(self, plan: Plan, outcome: Outcome) -> set[str]:
-        *notes, summary = self.write(plan, outcome)
+    def _finish(self, sentences: list[str]) -> set[str]:
+        *notes, summary = sentences
         for note in notes:
             self.report({'WARNING'}, note)
         self.report({'INFO'}, summary)

@@ -13,8 +13,7 @@ from bpy.props import EnumProperty
 from ...solver.errors import InputError, QC3DError
 from ..heat_map import heat_map, legend
 from ..heat_map.colors import MEASURE_ITEMS
-from ..keys import slider
-from ..keys.shape_keys import owned_keys, slider_owner
+from ..keys.chain_keys import control_of, owned_keys
 from ..store.records import Chain
 from ..store.summaries import WorstPlace
 from .common import SLIDER, chosen_chain, poll_chains
@@ -90,16 +89,14 @@ class QC3D_OT_select_worst(bpy.types.Operator):
         except QC3DError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        mesh, owner = obj.data, slider_owner(obj, chain)
-        if isinstance(owner[chain.slider], float):
-            owner[chain.slider] = worst.at
-            owner.update_tag()
-        else:
-            self.report({"WARNING"}, f"The slider '{chain.slider}' has whole numbers only and stays where it is.")
+        mesh = obj.data
+        stays = control_of(obj, chain).put(worst.at)
+        if stays is not None:
+            self.report({"WARNING"}, stays)
         # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
         steps = owned_keys(mesh.shape_keys, chain)
         if steps:
-            nearest = min(steps, key=lambda step: abs(step - worst.at * chain.intervals))
+            nearest = min(steps, key=lambda step: abs(chain.places[step] - worst.at))
             obj.active_shape_key_index = mesh.shape_keys.key_blocks.find(steps[nearest].name)
         _select(mesh, worst.vertex)
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
@@ -116,7 +113,7 @@ def _worst_place(obj: bpy.types.Object, chain: Chain) -> WorstPlace:
     worst = None if chain.result is None else chain.result.worst
     if worst is None or worst.vertex >= len(obj.data.vertices):
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")
-    slider.require(slider_owner(obj, chain), chain.slider)
+    control_of(obj, chain).require()
     return worst
 
 

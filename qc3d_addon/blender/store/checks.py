@@ -91,6 +91,27 @@ def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:
         raise InputError(problem)
 
 
+def control_problem(keys: bpy.types.Key, names: Sequence[str], base: str) -> str | None:
+    """Why the value of the last of these keys cannot play in-betweens from ``base``, the first, or None."""
+    key = keys.key_blocks[names[-1]]
+    if key == keys.reference_key:
+        return f"'{key.name}' is the Basis, which has no value; play them on a slider of their own."
+    if key.relative_key.name != base:
+        return (
+            f"'{key.name}' is relative to '{key.relative_key.name}', not to '{base}'; start from that key, or play "
+            "them on a slider of their own."
+        )
+    return None
+
+
+def require_control(keys: bpy.types.Key, names: Sequence[str], base: str) -> None:
+    """Raise InputError where a base is named and the last of the keys cannot play in-betweens from it."""
+    require_keys(keys, names)
+    problem = control_problem(keys, names, base) if base else None
+    if problem is not None:
+        raise InputError(problem)
+
+
 def _which(number: int, count: int) -> str:
     if number == 0:
         return "the first key"

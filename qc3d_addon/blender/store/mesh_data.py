@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from . import checks
+from .mirror_modifiers import mirror_planes
 
 if TYPE_CHECKING:
     from ...solver.keys.keypair import Ends, KeyPair
 
 
-def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPair]:
+def read_pairs(obj: bpy.types.Object, names: Sequence[str], base: str = "") -> dict[Ends, KeyPair]:
     """The pairs of shape keys that follow each other in ``names``, checked, by their names.
+
+    Keys with a vertex group are taken as they show; one that others are relative to, ``base``, as it is.
+    Where Mirror modifiers show the mesh as one half, they are those of the mirrored whole.
 
     Raises
     ------
@@ -29,8 +33,10 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str]) -> dict[Ends, KeyPai
     from ...solver.keys.keypair import consecutive_pairs
 
     checks.require_keys(obj.data.shape_keys, names)
-    coordinates = {name: key_coordinates(obj, name) for name in names}
-    return consecutive_pairs(coordinates, triangles(obj.data), wire_edges(obj.data), names)
+    coordinates = {name: key_coordinates(obj, name) if name == base else shown_coordinates(obj, name) for name in names}
+    mesh = obj.data
+    planes = mirror_planes(obj)
+    return consecutive_pairs(coordinates, triangles(mesh), wire_edges(mesh), names, polygons(mesh), planes)
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
@@ -53,6 +59,37 @@ def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     return coordinates.reshape(-1, 3)
 
 
+def shown_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
+    """(n, 3) float32: the positions of a shape key as it shows over what it is relative to, with its vertex group.
+
+    Raises
+    ------
+    InputError
+        If the key holds another number of points than the mesh has vertices.
+    """
+    keys = obj.data.shape_keys
+    group = keys.key_blocks[name].vertex_group
+    coordinates = key_coordinates(obj, name)
+    if not group or group not in obj.vertex_groups:
+        return coordinates
+    # Blender itself mixes it, on a copy that is in no scene.
+    copy = obj.copy()
+    mesh = copy.data = obj.data.copy()
+    try:
+        copy.show_only_shape_key = False
+        for key in mesh.shape_keys.key_blocks:
+            key.mute = key.name != name
+        mixed_key = mesh.shape_keys.key_blocks[name]
+        mixed_key.slider_min, mixed_key.slider_max, mixed_key.value = 0.0, 1.0, 1.0
+        mixed = key_coordinates(copy, copy.shape_key_add(name="mixed", from_mix=True).name)
+    finally:
+        bpy.data.objects.remove(copy)
+        bpy.data.meshes.remove(mesh)
+    return key_coordinates(obj, keys.key_blocks[name].relative_key.name) + (
+        mixed - key_coordinates(obj, keys.reference_key.name)
+    )
+
+
 def set_key_coordinates(key: bpy.types.ShapeKey, coordinates: NDArray[np.float32]) -> None:
     """Replace the positions of a shape key by an (n, 3) float32 array, bit for bit."""
     key.points.foreach_set("co", np.ascontiguousarray(coordinates, dtype=np.float32).ravel())
@@ -64,6 +101,14 @@ def triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
     return corners.reshape(-1, 3)
+
+
+def polygons(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(m,): the face that each of the ``triangles`` belongs to."""
+    mesh.calc_loop_triangles()
+    owners = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("polygon_index", owners)
+    return owners
 
 
 def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:

@@ -8,54 +8,61 @@ from collections.abc import Container, Sequence
 
 LIMIT = 63
 MAX_STEPS = 999
-ARROW = "→"
-ELLIPSIS = "…"
+# Names can be typed, and become no others where files allow letters, digits and underscores only.
+BETWEEN = "_to_"
+LEFT_OUT = "__"
 
-# Room after a label for the longest fraction, " 999/999", and for the ".001" that Blender adds to a name in use.
-_AFTER_LABEL = len(f" {MAX_STEPS}/{MAX_STEPS}") + len(".001")
+# Room after a label for the longest place, and for the ".001" that Blender adds to a name in use.
+_AFTER_LABEL = len("_99_9") + len(".001")
 _LEAST_ROOM = 9  # bytes of a name that still tell keys apart; with less for each, only the first and the last are named
 
 
 def chain_label(keys: Sequence[str], taken: Container[str]) -> str:
     """The name of the slider that goes through two keys or more, and the start of the names of its shape keys.
 
-    It reads "first→second→third". Long names lose their middle, because variants of one name usually differ at an end;
-    where there are too many keys the inner ones become "…"; a label that is taken gets a number in brackets.
+    It reads "first_to_second_to_third". Long names lose their middle, because variants of one name usually differ at an
+    end; where there are too many keys the inner ones become "__"; a label that is taken gets a number.
     """
     number = 1
     while True:
-        mark = "" if number == 1 else f" ({number})"
+        mark = "" if number == 1 else f"_v{number}"
         label = _join(keys, LIMIT - _AFTER_LABEL - len(mark)) + mark
         if label not in taken:
             return label
         number += 1
 
 
-def key_name(label: str, step: int, intervals: int) -> str:
-    """The name of the shape key at ``step`` of ``intervals``: "A→B 1/4" for the first of three in-betweens."""
-    return f"{label} {step}/{intervals}"
+def key_name(label: str, step: int, places: Sequence[float]) -> str:
+    """The name of the shape key at a step, by its place in hundredths: "Smile_25" for the first of three in-betweens.
+
+    Where two places are nearer to each other than that, it has tenths of a hundredth too: "Smile_33_3".
+    """
+    if len({round(100.0 * place) for place in places}) == len(places):
+        return f"{label}_{round(100.0 * places[step]):02d}"
+    whole, tenths = divmod(round(1000.0 * places[step]), 10)
+    return f"{label}_{whole:02d}_{tenths}"
 
 
 def _join(keys: Sequence[str], room: int) -> str:
-    if _size(ARROW.join(keys)) > room and room // len(keys) < _LEAST_ROOM + _size(ARROW):
-        keys = [keys[0], ELLIPSIS, keys[-1]]
-    room -= (len(keys) - 1) * _size(ARROW)
+    if _size(BETWEEN.join(keys)) > room and room // len(keys) < _LEAST_ROOM + _size(BETWEEN):
+        keys = [keys[0], LEFT_OUT, keys[-1]]
+    room -= (len(keys) - 1) * _size(BETWEEN)
     parts = list(keys)
     # Short names keep what they need; the longer ones share the rest.
     for left, index in enumerate(sorted(range(len(keys)), key=lambda number: _size(keys[number]))):
         parts[index] = _shorten(keys[index], room // (len(keys) - left))
         room -= _size(parts[index])
-    return ARROW.join(parts)
+    return BETWEEN.join(parts)
 
 
 def _shorten(name: str, room: int) -> str:
     if _size(name) <= room:
         return name
     raw = name.encode()
-    kept = room - _size(ELLIPSIS)
+    kept = room - _size(LEFT_OUT)
     head, tail = raw[: (kept + 1) // 2], raw[len(raw) - kept // 2 :]
     # A character cut in two at either edge is left out whole.
-    return head.decode(errors="ignore") + ELLIPSIS + tail.decode(errors="ignore")
+    return head.decode(errors="ignore") + LEFT_OUT + tail.decode(errors="ignore")
 
 
 def _size(text: str) -> int:

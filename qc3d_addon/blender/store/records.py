@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
 
@@ -23,14 +23,22 @@ from ...solver.errors import InputError
 from . import id_properties
 from . import stored_values as stored
 from .names import LIMIT, MAX_STEPS
+from .renames import renamed
 from .summaries import Summary
 
-PROPERTY = "qc3d"
-VERSION = 1  # of what is written; records from before there was a number have the same form
+if TYPE_CHECKING:
+    from ...solver.frames.weights import Weights
 
+PROPERTY = "qc3d"
+# Of what is written. Records of version 1, and from before there was a number, have a number of even steps, with hats
+# over them, in place of places and corners.
+VERSION = 2
+
+LEAST_DISTANCE = 1e-5  # between two places
 _MOST_FRAME = 2**31  # from 0, either way
 _LONGEST_KEY = 2 * LIMIT  # bytes: a mirror image goes through keys of names made up for it
 _LONGEST_FINGERPRINT = 1000
+_LONGEST_DIGEST = 64
 
 
 class DamagedRecordError(InputError):
@@ -47,10 +55,12 @@ class Chain:
         Names of the user's own keys that the slider goes through, from the first to the last.
     slider
         Name of the custom property that plays the chain.
-    intervals
-        Number of steps from the first key to the last.
+    places
+        Positions of the control at which it shows one shape alone, from 0 (the first key, step 0) to 1 (the last key).
+    corners
+        Steps at which the path between the shapes turns: all inner ones where it goes straight from shape to shape.
     keys
-        Generated shape keys: their names by step, 0 (first key) to ``intervals`` (last key).
+        Generated shape keys: their names by step.
     keyframes
         First and last frame of the keyframes that a bake put on the slider, or None.
     request
@@ -58,27 +68,35 @@ class Chain:
         ``BakeRequest.again`` looks into it.
     result
         What the panel shows of the newest bake, None for those of older versions.
+    on_key
+        Name of the user's key whose value plays the chain, the last of ``through``; empty where a slider of its own
+        does. ``slider`` is then only what the chain is called.
+    digests
+        What tells the shapes of the keys ``through`` at the newest bake; empty for those of older versions.
     mirror_of
         Slider of the chain that this one is the mirror image of; empty where it was baked from keys of its own.
     """
 
     through: tuple[str, ...]
     slider: str
-    intervals: int = 0
+    places: tuple[float, ...] = (0.0, 1.0)
+    corners: tuple[int, ...] = ()
     keys: dict[int, str] = field(default_factory=dict)
     keyframes: tuple[int, int] | None = None
     request: dict[str, Any] = field(default_factory=dict)
     result: Summary | None = None
     mirror_of: str = ""
+    on_key: str = ""
+    digests: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, values: object) -> Chain:
         """What ``dataclasses.asdict`` makes of it; raises ValueError, KeyError or TypeError for anything else."""
         found = dict(stored.plain_dict(values))
         through = tuple(stored.name(name, _LONGEST_KEY) for name in stored.plain_list(found.pop("through")))
-        intervals = stored.whole(found.pop("intervals"), 1, MAX_STEPS)
+        places, corners = _places(found)
         by_text = stored.plain_dict(found.pop("keys"))
-        steps = {str(step): step for step in range(intervals + 1)}
+        steps = {str(step): step for step in range(len(places))}
         keys = {steps[text]: stored.name(name) for text, name in by_text.items()}
         if len(through) < 2 or any(name == following for name, following in pairwise(through)):
             raise ValueError("not a row of keys")
@@ -92,9 +110,30 @@ class Chain:
             keyframes = (first, last)
         request, result = _request(found.pop("request", {})), Summary.from_json(found.pop("result", None))
         slider, mirror_of = stored.name(found.pop("slider")), stored.text(found.pop("mirror_of", ""), LIMIT)
+        on_key = stored.text(found.pop("on_key", ""), LIMIT)
+        digests = tuple(stored.text(one, _LONGEST_DIGEST) for one in stored.plain_list(found.pop("digests", [])))
+        if on_key not in ("", through[-1]):
+            raise ValueError("played by a key that is not its last")
         if found:
             raise ValueError("values that are not known")
-        return cls(through, slider, intervals, keys, keyframes, request, result, mirror_of)
+        return cls(through, slider, places, corners, keys, keyframes, request, result, mirror_of, on_key, digests)
+
+    @property
+    def base(self) -> str:
+        """Name of the key that the one which plays the chain is relative to; empty where there is a slider."""
+        return self.through[0] if self.on_key else ""
+
+    @property
+    def intervals(self) -> int:
+        """Number of steps from the first key to the last."""
+        return len(self.places) - 1
+
+    @property
+    def weights(self) -> Weights:
+        """What the control plays: how much of each step's shape at each of its positions."""
+        from ...solver.frames.weights import Weights  # scipy would make Blender start slower
+
+        return Weights.smooth(self.places, self.corners)
 
 
 @dataclass(frozen=True)
@@ -135,7 +174,11 @@ class Record:
             If the record is damaged (DamagedRecordError), or a later version wrote it.
         """
         text = keys.get(PROPERTY)
-        return cls() if text is None else cls._parsed(text, keys.name)
+        if text is None:
+            return cls()
+        record = cls._parsed(text, keys.name)
+        record._follow(keys)
+        return record
 
     @classmethod
     def _parsed(cls, text: object, owner: str) -> Record:
@@ -148,7 +191,8 @@ class Record:
                 )
             chains = [Chain.from_json(entry) for entry in stored.plain_list(values["chains"])]
             maps = [KeptMap.from_json(entry) for entry in stored.plain_list(values["maps"])]
-            for of_each in ([chain.slider for chain in chains], [chain.through for chain in chains]):
+            controls = [chain.on_key or chain.through for chain in chains]
+            for of_each in ([chain.slider for chain in chains], controls):
                 if len(set(of_each)) < len(of_each):
                     raise ValueError("two chains with one slider, or through the same keys")
         except (ValueError, KeyError, TypeError) as error:
@@ -157,6 +201,13 @@ class Record:
                 "In-Betweens, which keeps all shape keys and sliders, then bake anew."
             ) from error
         return cls(chains, maps)
+
+    def _follow(self, keys: bpy.types.Key) -> None:
+        """Take the names that keys of chains have now where they were renamed; their maps are made again."""
+        for chain in self.chains:
+            names = renamed(keys, chain.through, chain.digests, chain.on_key, chain.keys.values())
+            chain.through = tuple(names.get(name, name) for name in chain.through)
+            chain.on_key = names.get(chain.on_key, chain.on_key)
 
     def write(self, keys: bpy.types.Key, undo: ExitStack) -> None:
         """Keep the record with ``keys``, without the maps of keys that no longer exist; ``undo`` can take it back."""
@@ -169,8 +220,12 @@ class Record:
         id_properties.put(keys, PROPERTY, text, undo)
 
     def chain(self, through: tuple[str, ...]) -> Chain | None:
-        """The chain through these keys, if it was baked before."""
-        return next((chain for chain in self.chains if chain.through == through), None)
+        """The chain through these keys on a slider of its own, if it was baked before."""
+        return next((chain for chain in self.chains if chain.through == through and not chain.on_key), None)
+
+    def chain_on_key(self, name: str) -> Chain | None:
+        """The chain that the value of a key plays, if it was baked before."""
+        return next((chain for chain in self.chains if chain.on_key == name), None)
 
     def chain_of_slider(self, slider: str) -> Chain | None:
         """The chain that a slider plays; the newest where the name is empty."""
@@ -215,11 +270,27 @@ def _state(text: str, owner: str) -> State:
         return State(0, str(error), isinstance(error, DamagedRecordError))
 
 
+def _places(found: dict[str, Any]) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """The places and corners among a chain's values, which are taken out of them."""
+    if "intervals" in found:
+        intervals = stored.whole(found.pop("intervals"), 1, MAX_STEPS)
+        return tuple(step / intervals for step in range(intervals + 1)), tuple(range(1, intervals))
+    places = tuple(stored.number(place, 0.0, 1.0) for place in stored.plain_list(found.pop("places")))
+    corners = tuple(stored.whole(step, 1, len(places) - 2) for step in stored.plain_list(found.pop("corners")))
+    if not 2 <= len(places) <= MAX_STEPS + 1 or (places[0], places[-1]) != (0.0, 1.0):
+        raise ValueError("not places from 0 to 1")
+    if any(later - place < LEAST_DISTANCE for place, later in pairwise(places)):
+        raise ValueError("places that are not in order")
+    if any(later <= step for step, later in pairwise(corners)):
+        raise ValueError("corners that are not in order")
+    return places, corners
+
+
 def _request(values: object) -> dict[str, Any]:
-    """What a bake was asked for, as it is: plain values, and dictionaries of plain values."""
+    """What a bake was asked for, as it is: plain values, and dictionaries and lists of plain values."""
     found = stored.plain_dict(values)
     for value in found.values():
-        for inner in value.values() if isinstance(value, dict) else (value,):
+        for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else (value,):
             if isinstance(inner, (dict, list)):
                 raise ValueError("nested too deep")
     return found

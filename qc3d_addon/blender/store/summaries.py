@@ -8,13 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from . import stored_values as stored
 
 if TYPE_CHECKING:
-    from ...solver.frames.report import BakeReport
+    from ...solver.frames.report import BakeReport, PlayedReport
 
 _MOST = 2**63 - 1  # of what is counted
 
@@ -46,6 +43,49 @@ class WorstPlace:
 
 
 @dataclass(frozen=True)
+class Played:
+    """What a control plays between its shapes, the worst of many positions.
+
+    Parameters
+    ----------
+    distance
+        How far a vertex is from where the computed motion has it, over the size.
+    stretch
+        How far an edge leaves the interval between its lengths in the two keys.
+    volume
+        How far an enclosed volume is from what lies between its two keys; None where nothing is closed.
+    folds, crossings
+        As those of the in-betweens, at one position.
+    """
+
+    distance: float
+    stretch: float
+    volume: float | None
+    folds: int | None
+    crossings: int | None
+
+    @classmethod
+    def of_report(cls, report: PlayedReport) -> Played:
+        """What there is to remember of the solver's report."""
+        return cls(report.distance, report.worst_stretch, report.volume, report.folds, report.crossings)
+
+    @classmethod
+    def from_json(cls, values: object) -> Played:
+        """What ``dataclasses.asdict`` makes of it; raises ValueError, KeyError or TypeError for anything else."""
+        found = stored.plain_dict(values)
+        volume = found["volume"]
+        folds, crossings = (None if found[name] is None else stored.whole(found[name], 0, _MOST)
+                            for name in ("folds", "crossings"))  # fmt: skip
+        return cls(
+            stored.number(found["distance"], 0.0),
+            stored.number(found["stretch"], 0.0),
+            None if volume is None else stored.number(volume, 0.0),
+            folds,
+            crossings,
+        )
+
+
+@dataclass(frozen=True)
 class Summary:
     """How a bake turned out.
 
@@ -67,6 +107,8 @@ class Summary:
         How far the map is from the second key before that is blended in, over the size; None without a map.
     collider_crossings
         Number of pairs of triangles that cross with colliders; None where there were none.
+    played
+        What the control plays between the in-betweens; None for those of older versions.
     notes
         Sentences for the user.
     """
@@ -79,23 +121,23 @@ class Summary:
     worst: WorstPlace | None
     residual: float | None
     collider_crossings: int | None = None
+    played: Played | None = None
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of_report(
-        cls, report: BakeReport, times: NDArray[np.float64], chosen: NDArray[np.int64], notes: Sequence[str]
-    ) -> Summary:
-        """The summary of the frames ``chosen`` among those at ``times``, which the solver's ``report`` is about."""
-        worst = report.worst_stretch
+    def of_report(cls, report: BakeReport, places: Sequence[float], notes: Sequence[str]) -> Summary:
+        """The summary of the solver's ``report`` about shapes at these places of their control."""
+        worst, played = report.worst_stretch, report.played
         return cls(
-            count=len(chosen) - 2,
+            count=len(places) - 2,
             engine=report.engine,
             seconds=sum(report.seconds.values()),
-            folds=_summed(report.folds.frames, chosen),
-            crossings=_summed(report.crossings, chosen),
-            worst=WorstPlace(worst.excess, float(times[worst.frame]), worst.vertex),
+            folds=_summed(report.folds.frames),
+            crossings=_summed(report.crossings),
+            worst=WorstPlace(worst.excess, places[worst.frame], worst.vertex),
             residual=None if report.residual is None else report.residual.rms,
-            collider_crossings=_summed(report.collider_crossings, chosen),
+            collider_crossings=_summed(report.collider_crossings),
+            played=None if played is None else Played.of_report(played),
             notes=tuple(notes),
         )
 
@@ -118,13 +160,13 @@ class Summary:
         if found["residual"] is not None:
             found["residual"] = stored.number(found["residual"], 0.0)
         found["worst"] = WorstPlace.from_json(found["worst"]) if found.get("worst") else None
+        found["played"] = Played.from_json(found["played"]) if found.get("played") else None
         found["engine"] = stored.text(found["engine"])
         found["seconds"] = stored.number(found["seconds"], 0.0)
         found["notes"] = tuple(stored.text(note) for note in stored.plain_list(found["notes"]))
         return cls(**found)
 
 
-def _summed(counts: Sequence[int | None] | None, chosen: NDArray[np.int64]) -> int | None:
-    """The sum over the chosen frames; None where nothing, or not everything, is known."""
-    known = [None if counts is None else counts[step] for step in chosen]
-    return None if None in known else sum(count or 0 for count in known)
+def _summed(counts: Sequence[int | None] | None) -> int | None:
+    """The sum over all shapes; None where nothing, or not everything, is known."""
+    return None if counts is None or None in counts else sum(count or 0 for count in counts)

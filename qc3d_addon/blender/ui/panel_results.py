@@ -9,7 +9,7 @@ import bpy
 from ...solver.errors import InputError
 from .. import live_scrub
 from ..heat_map import heat_map
-from ..keys import shape_keys, slider
+from ..keys import chain_keys
 from ..operators.bake_inbetweens import QC3D_OT_rebake
 from ..operators.chains import (
     QC3D_OT_absolute_keys,
@@ -73,13 +73,13 @@ class QC3D_PT_results(bpy.types.Panel):
 def _draw_chain(
     context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
 ) -> None:
-    owner = shape_keys.slider_owner(obj, chain)
-    slider_problem = slider.problem(owner, chain.slider)
-    if slider_problem is None:
-        layout.prop(owner, slider.data_path(chain.slider), text=chain.slider, slider=True)
+    control = chain_keys.control_of(obj, chain)
+    control_problem = control.problem
+    if control_problem is None:
+        layout.prop(*control.shown, text=control.name, slider=True)
     else:
-        draw_sentence(context, layout, slider_problem, 'ERROR')
-    if shape_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+        draw_sentence(context, layout, control_problem, 'ERROR')
+    if chain_keys.are_drivers_stopped(obj.data.shape_keys, chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(obj.data.shape_keys, chain)
     buttons = layout.row(align=True)
@@ -113,18 +113,28 @@ def _draw_result(
         draw_sentence(context, facts, f"Mirrored from {chain.mirror_of}", 'MOD_MIRROR')
     seconds = "" if chain.mirror_of else f" in {result.seconds:.1f} s"
     facts.label(text=f"{result.count} in-betweens{seconds}")
-    counts = {what: count for name, what in _PROBLEMS.items() if (count := getattr(result, name)) is not None}
+    counts = {what: count for name, what in _PROBLEMS.items() if (count := _count(result, name)) is not None}
     problems = [f"{count} {what}" for what, count in counts.items() if count]
     if counts:
         facts.label(
             text=", ".join(problems) or f"No {', no '.join(counts)}",
             icon='ERROR' if problems else 'CHECKMARK',
         )
+    if result.played is not None:
+        volume = "" if result.played.volume is None else f", volume within {result.played.volume:.1%}"
+        facts.label(text=f"Plays the motion within {result.played.distance:.2%} of the size")
+        facts.label(text=f"Lengths hold within {result.played.stretch:.1%}{volume}")
     if result.residual is None:
         facts.label(text="Straight blend, without a map")
     else:
         facts.label(text=f"Fitted within {result.residual:.2%} of the size")
         facts.label(text=f"Engine {result.engine}")
+
+
+def _count(result: Summary, name: str) -> int | None:
+    """The most of a kind of problem, in the in-betweens and in what is played between them."""
+    counts = [getattr(result, name), getattr(result.played, name, None)]
+    return max((count for count in counts if count is not None), default=None)
 
 
 def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain) -> None:

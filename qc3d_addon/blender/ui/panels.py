@@ -9,6 +9,7 @@ import bpy
 from ...worker import engines
 from ..bake import jobs, progress_bar
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from ..operators.bake_keys import QC3D_OT_bake_keys
 from ..operators.cancel import QC3D_OT_cancel
 from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from ..operators.map_files import QC3D_OT_load_map
@@ -47,6 +48,11 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         button.operator_context = IN_THE_SIDEBAR
         button.scale_y = 1.4
         button.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
+        if checks.object_problem(obj) is None:
+            every = layout.row(align=True)
+            every.operator_context = IN_THE_SIDEBAR
+            every.operator(QC3D_OT_bake_keys.bl_idname, text="Selected Keys").which = "selected"
+            every.operator(QC3D_OT_bake_keys.bl_idname, text="All Keys").which = "all"
         if problem is not None:
             draw_sentence(context, layout, problem)
             return
@@ -63,6 +69,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
     amount.prop(settings, "use_tolerance")
     look = layout.column()
+    look.row().prop(settings, "play_on", expand=True)
     look.prop(settings, "mode")
     look.row().prop(settings, "quality", expand=True)
     look.prop_search(settings, "colliders", bpy.data, "collections")
@@ -75,7 +82,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     header.label(text="Advanced")
     if advanced is not None:
         choices = advanced.column()
-        for name in ("easing", "stretch", "extra_turns", "engine", "seed"):
+        for name in ("weights", "easing", "stretch", "extra_turns", "engine", "seed"):
             choices.prop(settings, name)
         advanced.operator_context = IN_THE_SIDEBAR
         row = advanced.row(align=True)

@@ -11,7 +11,19 @@ from bl_operators.presets import AddPresetBase
 
 from ..store import checks
 
-SETTINGS = ("count", "use_tolerance", "tolerance", "mode", "quality", "easing", "stretch", "engine", "seed")
+SETTINGS = (
+    "count",
+    "use_tolerance",
+    "tolerance",
+    "weights",
+    "play_on",
+    "mode",
+    "quality",
+    "easing",
+    "stretch",
+    "engine",
+    "seed",
+)
 FOLDER = "qc3d"
 
 

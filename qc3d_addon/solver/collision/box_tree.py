@@ -56,8 +56,7 @@ class Budget:
         self.left -= work
         if self.left < 0:
             raise CrowdedError(
-                "So many triangles lie over each other that looking for crossings would take too long; remove "
-                "triangles that are there many times over."
+                "So many triangles overlap that searching for crossings would take too long; remove repeated triangles."
             )
 
 

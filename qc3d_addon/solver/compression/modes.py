@@ -14,18 +14,25 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 
 from ..arrays import Floats
 from ..errors import InputError
-from ..numerics.assembly import StiffnessPattern, stiffness_elements
+from ..numerics.assembly import gradient_operator
 from ..numerics.grouped_sums import sums_by_label
+from ..numerics.lowest_eigenvectors import BLOCK, GUARDS, EigenPairs, coarse_eigenvectors, lowest_eigenvectors
+from ..numerics.multigrid import Multigrid
+from ..support.memory import require_memory_for_modes
 from ..tets.mesh import TetMesh
 
 # A shift below the eigenvalue 0, in units of the domain's own lowest frequencies.
 _SHIFT = -0.1
 _SEED = 20230805
+# Matrices of so few vertices are factored: that takes a second or two. It also is for so many modes that multigrid's
+# second mesh, which has about a thirtieth of the vertices, does not have them.
+_FEW, _PER_MODE = 10_000, 100
+_TOLERANCE = 1e-8  # of the residuals, over the largest eigenvalue asked for
 
 Weights = Literal["volume", "equal"]
 
@@ -37,9 +44,10 @@ class Spectrum:
     Parameters
     ----------
     eigenvalues : (k,)
-        Ascending; the first is 0 for a mesh in one piece. One over a length squared.
+        Ascending; as many are 0 as the mesh has connected parts. One over a length squared.
     modes : (N, k)
-        Values at the vertices, orthonormal with the vertices' weights, which sum to the mesh's volume.
+        Values at the vertices, orthonormal with the vertices' weights, which sum to the mesh's volume; 0 at vertices
+        of no tetrahedron.
     """
 
     eigenvalues: Floats
@@ -95,25 +103,47 @@ def spectrum(mesh: TetMesh, count: int, weights: Weights = "volume") -> Spectrum
     Raises
     ------
     InputError
-        If the mesh has too few vertices for so many modes.
+        If the mesh has too few vertices for so many modes, or needs more memory for them than there is.
     """
-    most = len(mesh.points) - 2
+    used = np.unique(mesh.tets)
+    most = len(used) - 2
     if not 1 <= count <= most:
-        raise InputError(f"{count} modes are not possible on {len(mesh.points)} vertices; choose 1 to {most}.")
-    stiffness = StiffnessPattern(mesh.tets, len(mesh.points)).assemble(
-        stiffness_elements(mesh.volumes, mesh.gradients)
-    )
-    size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    mass = Transfer(mesh).vertex_volumes
+        raise InputError(f"{count} modes are not possible on {len(used)} vertices; choose 1 to {most}.")
+    is_factored = len(used) <= _FEW or count * _PER_MODE > len(used)
+    require_memory_for_modes(len(used), count, 0 if is_factored else min(BLOCK, count + GUARDS))
+    gradient = gradient_operator(mesh.tets, mesh.gradients, len(mesh.points))
+    stiffness = csr_array(gradient.T @ (diags_array(np.tile(mesh.volumes, 3)) @ gradient))
+    del gradient
+    size = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
+    mass = Transfer(mesh).vertex_volumes[used]
     if weights == "equal":
         mass = np.full(len(mass), mass.mean())
     # With the square root of the mass on both sides the problem is an ordinary symmetric one.
-    scale = 1.0 / np.sqrt(np.maximum(mass, 1e-300))
-    matrix = csc_array(diags_array(scale) @ stiffness @ diags_array(scale))
-    start = np.random.default_rng(_SEED).normal(size=len(mesh.points))
-    values, vectors = eigsh(matrix, k=count, sigma=_SHIFT / size**2, v0=start)
-    order = np.argsort(values, kind="stable")
-    modes = scale[:, None] * vectors[:, order]
+    scale = 1.0 / np.sqrt(mass)
+    matrix = csr_array(diags_array(scale) @ stiffness[used][:, used] @ diags_array(scale))
+    start = np.random.default_rng(_SEED).normal(size=len(used))
+    shift = _SHIFT / size**2
+    values, vectors = _factored(matrix, count, shift, start) if is_factored else _iterated(matrix, count, shift, scale)
     # A mode and its opposite are equally right: the same one is taken whatever the solver returns.
-    signs = np.where(start @ (modes / scale[:, None]) < 0.0, -1.0, 1.0)
-    return Spectrum(np.maximum(values[order], 0.0), modes * signs)
+    signs = np.where(start @ vectors < 0.0, -1.0, 1.0)
+    modes = np.zeros((len(mesh.points), count))
+    modes[used] = scale[:, None] * vectors * signs
+    return Spectrum(np.maximum(values, 0.0), modes)
+
+
+def _factored(matrix: csr_array, count: int, shift: float, start: Floats) -> EigenPairs:
+    """By Lanczos' method on the inverse of the shifted matrix."""
+    values, vectors = eigsh(csc_array(matrix), k=count, sigma=shift, v0=start)
+    order = np.argsort(values, kind="stable")
+    return EigenPairs(values[order], vectors[:, order])
+
+
+def _iterated(matrix: csr_array, count: int, shift: float, scale: Floats) -> EigenPairs:
+    """Preconditioned by multigrid, for which the shifted matrix is positive definite; nothing large is factored."""
+    shifted = csr_array(matrix - shift * eye_array(len(scale)))
+    multigrid = Multigrid(shifted, 1.0 / scale, np.random.default_rng(_SEED))
+    assert multigrid.interpolation is not None
+    start = coarse_eigenvectors(matrix, multigrid.interpolation, count + GUARDS)
+    # The values of the approximations are above the true ones, by little at this end.
+    highest = float(np.linalg.norm(start[:, count - 1] @ (matrix @ start[:, count - 1])))
+    return lowest_eigenvectors(matrix, multigrid.approximate_solution, start, count, _TOLERANCE * highest)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Large motions in small steps: the fold-free map follows the surface along its path to the second key."""
+"""Continuation: for large motions, the fold-free map follows the surface along its path in small steps."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ from ..support.threads import batches
 from ..surface.path import SurfacePath
 from .fold_free import FoldFreeFitter
 
-STEP_DEGREES = 20.0
-_STEP_ITERATIONS = 12
-_PATH_SWEEPS = 4
-_LAST_ITERATIONS = 40
+STEP_DEGREES = 20.0  # rotation in one step; each step then takes only a few Newton iterations
+_STEP_ITERATIONS = 12  # at most; steps along the way need not converge
+_PATH_SWEEPS = 4  # the shapes along the way only guide the map, so rough ones will do
+_TARGET_STEP = 2.0**-16  # cube units, to which those shapes are rounded: far above rounding errors, far below the mesh
+_LAST_ITERATIONS = 40  # at most, for the second key
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedPath:
-    """The maps on the way to the second key, and how the tetrahedra turned.
+    """The maps along the way to the second key, and the rotations of the tetrahedra.
 
     Parameters
     ----------
     maps : (K + 1, N, 3)
-        Values of the maps at the times 0, 1/K, ..., 1: the identity first, the fitted map last, none with folds.
+        Values, in cube units, of the maps at the times 0, 1/K, ..., 1, all without folds. The first is the identity,
+        the last the fitted map.
     turns : (M, 3)
-        Rotation vectors of the tetrahedra in radians, followed from step to step: angles may exceed pi.
+        Rotation vectors of the tetrahedra, radians, unwrapped from step to step, so that angles may exceed pi.
     """
 
     maps: Floats
@@ -39,32 +41,33 @@ class FollowedPath:
 
 
 def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
-    """Shapes (n, 3) on the way to the second key, in cube units, evenly spaced in time; the key itself comes last.
+    """Shapes (n, 3) along the way to the second key, in cube units, evenly spaced in time; the last is the key itself.
 
-    Their number follows the 99th percentile of the triangles' rotations, about 20 degrees a step.
+    Their number is chosen so that 99 % of the triangles turn by at most about 20 degrees in each step.
     """
     angles = np.degrees(path.turning.angles)
     # Rounding must not make it one more.
     steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES - 1e-6))) if len(angles) else 1
     moments = [(step / steps, None) for step in range(1, steps)]
-    # The shapes on the way only lead the map; they need not have settled.
+    # The shapes along the way only guide the map; they need not have converged. Rounding them keeps noise from guiding
+    # it elsewhere.
     shapes = [shape for few in batches(moments, path.shapes_at_once) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]
-    return [*shapes, key1]
+    return [*(np.round(shape / _TARGET_STEP) * _TARGET_STEP for shape in shapes), key1]
 
 
 def follow_path(fitter: FoldFreeFitter, targets: Sequence[Floats]) -> Generator[float, None, FollowedPath]:
-    """Fit the map to the second key by way of the shapes between.
+    """Fit the map to the second key along a sequence of targets.
 
     Parameters
     ----------
     fitter : FoldFreeFitter
     targets : sequence of (n, 3)
-        Where the landmarks should be after each step, cube units; the second key last.
+        Targets of the landmarks after each step, cube units; the last is the second key.
 
     Yields
     ------
     float
-        The part that is done, 0..1.
+        Finished share of the work, 0..1.
     """
     mesh, steps = fitter.mesh, len(targets)
     maps = np.empty((steps + 1, *mesh.points.shape))

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fitted maps of a row of keys as one file: for another copy of the same mesh, which then need not be fitted.
+"""Files of the fitted maps of a chain, so that another copy of the same mesh need not be fitted again.
 
-A file is a magic word, a version, a header in JSON and the maps as ``storage.to_bytes`` makes them. Nothing in it is
-the name of a file, or run.
+A file consists of a magic number, a version, a JSON header, and the maps as ``storage.to_bytes`` makes them. It
+contains no file names and nothing that is executed.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _OPTIONS = ("stretch", "extra_turns", "engine", "quality", "seed")
 
 @dataclass(frozen=True, eq=False)
 class KeptMaps:
-    """The maps along a row of keys.
+    """The fitted maps of a chain.
 
     Parameters
     ----------
     through : tuple of str
-        Names of the keys, from the first to the last.
+        Names of the keys from the first to the last.
     options : FitOptions
-        What the maps were made with.
+        The options that the maps were fitted with.
     maps : dict
-        A stored map by the names of its two keys, for every two that follow each other.
+        The stored map of each pair of consecutive keys, by the names of the two keys.
     """
 
     through: tuple[str, ...]
@@ -46,7 +46,7 @@ class KeptMaps:
 
 
 def write_maps(path: Path, kept: KeptMaps) -> None:
-    """Write a file whole or not at all; raises InputError if it cannot be written."""
+    """Write the maps to a file, completely or not at all; raises InputError if it cannot be written."""
     ends = list(dict.fromkeys(pairwise(kept.through)))
     header = {
         "through": kept.through,
@@ -66,7 +66,7 @@ def read_maps(path: Path) -> KeptMaps:
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged, of another version, or something else.
+        If the file cannot be read, is damaged, has another version, or is not a file of maps.
     """
     require_file(path)
     try:

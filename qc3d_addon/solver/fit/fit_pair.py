@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part of a bake that is done once for two keys: the cube filled, the fold-free map fitted."""
+"""The fit of a pair of keys, done once for all its frames: the cube is filled and the fold-free map is fitted."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from ..arrays import Floats
 from ..keys.embedding import Embedding
@@ -21,24 +23,29 @@ from .continuation import follow_path, path_to
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
 
-# Landmarks of real keys, self-crossing ones included, are missed by less than a tenth of this part of their size.
+# As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
 
 
 def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
 
+    Parameters
+    ----------
+    pair : KeyPair
+    options : FitOptions
+
     Raises
     ------
     InputError
-        If more than half of the second key is mirrored, turned inside out or crossed by itself, which no map without
-        folds reaches.
+        If more than half of the second key is mirrored, turned inside out or tangled, which no fold-free map can reach,
+        or if the keys are too large, too small, or of too different sizes.
     MeshingError
-        If the engine asked for cannot fill the cube.
+        If the chosen engine cannot fill the cube.
 
     Notes
     -----
-    Where only parts of the mesh are out of reach the map stays as near as it can, a note says so, and the surface meets
+    If only parts of the mesh cannot be reached, the map stays as close as it can and a note says so; in-betweens meet
     both keys all the same.
     """
     require_sizes(pair)
@@ -48,16 +55,17 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, pair.faces, options)
+            filled = fill_cube(in_single_precision(embedding.key0), pair.faces, options)
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
             landmarks = interpolation_matrix(filled.mesh, embedding.key0)
+            coarse = interpolation_matrix(filled.mesh, in_single_precision(embedding.key0))
         yield Progress("locate", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
+        fitter = FoldFreeFitter(filled.mesh, coarse, in_single_precision(embedding.weights))
         followed = yield from staged("fit", follow_path(fitter, targets))
     yield Progress("fit", 1.0)
     fitted = FittedMap(
@@ -76,13 +84,13 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     missed = fitted.landmark_residual().rms
     if out_of_reach.parts:
         note = (
-            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys: no motion of a volume "
-            "does that, and the mode straight may look no worse."
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys, which no motion of a "
+            "volume can do. Mode straight may look as good."
         )
     elif missed > _LARGE_RESIDUAL:
         note = (
-            f"The map misses the second key by {missed:.0%} of its size: no map without folds comes nearer to what the "
-            "second key crosses or flattens, and the mode straight may look no worse."
+            f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
+            "the second key crosses itself or is flattened. Mode straight may look as good."
         )
     else:
         return fitted
@@ -90,11 +98,20 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
-    """The surface's own path to the second key, and the shapes on it that lead the map."""
+    """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
         path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
-        return path, path_to(path, embedding.key1)
+        return path, path_to(path, in_single_precision(embedding.key1))
 
 
 def _parts(count: int) -> str:
     return "A part of the mesh is" if count == 1 else f"{count} parts of the mesh are"
+
+
+def in_single_precision(values: Floats) -> Floats:
+    """Values rounded to single precision.
+
+    A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as keys
+    that were moved, must lead to the same map.
+    """
+    return np.asarray(values, dtype=np.float32).astype(np.float64)

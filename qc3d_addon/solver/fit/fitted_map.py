@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a pair of keys needs only once: the mesh of the cube and the fold-free map fitted to the keys."""
+"""Fitted maps: the mesh of the cube and the fold-free map of a pair of keys, computed once and used for all frames."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from ..triangles.winding_number import insideness, winding_numbers
 from .fold_free import FoldFreeFitter
 from .fold_repair import covered
 
-_REPAIR_ITERATIONS = 15
+_REPAIR_ITERATIONS = 15  # of a fit that starts close to its target
 
 
 @dataclass(frozen=True)
 class Residual:
-    """How far a fitted map leaves the vertices from the second key, over the bounding-box diagonal.
+    """Residual of a fitted map: distances of the mapped vertices from the second key, over the bounding-box diagonal.
 
     Parameters
     ----------
-    rms
-        Root of the mean square, weighted by the areas around the vertices.
-    max
-        The worst vertex.
+    rms : float
+        Root mean square, weighted by vertex areas.
+    max : float
+        The largest distance.
     """
 
     rms: float
@@ -43,7 +43,7 @@ class Residual:
 
 @dataclass(frozen=True, eq=False)
 class FittedMap:
-    """A fitted map of the cube, kept so that later bakes of the same keys skip meshing and fitting.
+    """The fitted map of a pair of keys. It is kept, so that later bakes of the same keys skip meshing and fitting.
 
     Parameters
     ----------
@@ -51,24 +51,24 @@ class FittedMap:
     mesh : TetMesh
         The filled unit cube.
     maps : (K + 1, N, 3)
-        Values at the mesh's vertices, cube units, of maps without folds along the way, evenly spaced in time: the
-        identity first, the map fitted to the second key last.
+        Values, in cube units, of fold-free maps along the way, evenly spaced in time. The first is the identity, the
+        last is fitted to the second key.
     turns : (M, 3)
-        Rotation vectors of the tetrahedra of the last map, radians, in the branch that the motion takes.
+        Unwrapped rotation vectors of the tetrahedra of the last map, radians.
     options : FitOptions
-        What it was fitted with.
+        The options that it was fitted with.
     engine : str
-        The engine that made the mesh, which option ``auto`` leaves open.
+        The engine that made the mesh; the option ``auto`` leaves it open.
     embedding : Embedding
         The pair in cube units.
-    landmarks : (n, N)
+    landmarks : (n, N) sparse
         Barycentric coordinates of the first key's vertices in the mesh.
     notes : tuple of str
-        Sentences for the user, such as why another engine ran.
+        Sentences for the user, such as why another engine was used.
     seconds : dict
-        Time spent per stage.
+        Wall-clock time of each stage, in seconds.
     path : SurfacePath, optional
-        The surface's path between the keys, where it is known already.
+        The surface path between the keys, if it is known already.
     """
 
     pair: KeyPair
@@ -94,39 +94,40 @@ class FittedMap:
         engine: str,
         notes: tuple[str, ...] = (),
     ) -> FittedMap:
-        """A fitted map from what is stored of it; the rest is computed again."""
+        """Restore a fitted map from its stored parts; everything else is computed again."""
         embedding = Embedding.of(pair)
         landmarks = interpolation_matrix(mesh, embedding.key0)
         return cls(pair, mesh, maps, turns, options, engine, embedding, landmarks, notes)
 
     @property
     def mapped(self) -> Floats:
-        """(N, 3): values of the fitted map."""
+        """(N, 3) values of the fitted map, cube units."""
         return np.asarray(self.maps[-1])
 
     @cached_property
     def surface_path(self) -> SurfacePath:
-        """The surface's path between the keys; kept, because setting it up costs as much as several frames."""
+        """The surface path between the keys; cached, because setting it up takes as long as several frames."""
         return self.path or SurfacePath(self.embedding, self.options.stretch, self.options.extra_turns != 0)
 
     @cached_property
     def insideness(self) -> Floats:
-        """(M,) how far inside the object the tetrahedra are."""
+        """(M,) weight of each tetrahedron by its winding number: 1 inside the object, small outside."""
         return insideness(winding_numbers(self.embedding.key0, self.pair.faces, self.mesh.centroids))
 
     @cached_property
     def fitter(self) -> FoldFreeFitter:
-        """Fits further maps of the same mesh."""
+        """The fitter for further maps of the same mesh."""
         return FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
 
     def folds(self, values: Floats) -> int:
-        """Tetrahedra that the map with these values (N, 3) does not keep positively oriented."""
+        """Number of folds of a map with ``values`` (N, 3): tetrahedra that it inverts or flattens."""
         return int((determinants(self.mesh.jacobians(values)) <= 0.0).sum())
 
     def unfolded(self, values: Floats, time: float) -> Floats:
-        """A map without folds near the map ``values`` (N, 3), by means of the nearest on the way.
+        """(N, 3) a map without folds close to the map ``values`` (N, 3) at ``time`` in 0..1.
 
-        That covers the folds; where it cannot, it is drawn to the landmarks of ``values``.
+        The nearest map along the way is blended in around the folds. If folds are left, that map is instead fitted to
+        the landmarks of ``values``.
         """
         nearest = self.maps[round(time * (len(self.maps) - 1))]
         found = covered(self.mesh, values, nearest)
@@ -135,11 +136,11 @@ class FittedMap:
         return found
 
     def folds_left(self, values: Floats, time: float) -> int:
-        """Folds of a map (N, 3) at ``time`` that cannot be taken away by means of the fitted maps."""
+        """Number of folds of a map (N, 3) at ``time`` that ``unfolded`` cannot remove."""
         return self.folds(self.unfolded(values, time)) if self.folds(values) else 0
 
     def landmark_residual(self) -> Residual:
-        """Distance of the mapped landmarks from the second key."""
+        """The residual: distances of the mapped landmarks from the second key."""
         embedding = self.embedding
         missed = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
         missed /= self.pair.diagonal * embedding.scale

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fold-free maps of the cube with a sliding boundary and soft landmarks.
+"""Fold-free maps of the cube with a sliding boundary and soft landmark constraints.
 
-The energy mixes a conformal and a volume term (Garanzha et al. 2021, "Foldover-free maps in 50 lines of code") and is
-infinite on folded elements: a line search that starts at a map without folds never leaves such maps. It is minimised
-by a Gauss-Newton step whose element blocks are projected to be positive semi-definite, solved by preconditioned
-conjugate gradients. Targets far away are approached along a path (module ``continuation``).
+The energy is the sum of a conformal and a volume term (Garanzha et al. 2021, "Foldover-free maps in 50 lines of code").
+It is infinite on folded elements, so a line search that starts at a map without folds only reaches such maps. It is
+minimized by Gauss-Newton steps, whose element blocks are projected to positive semi-definite matrices, and which are
+solved by preconditioned conjugate gradients. Distant targets are approached along a path (module ``continuation``).
 """
 
 from __future__ import annotations
@@ -21,24 +21,25 @@ from ..numerics.assembly import StiffnessPattern
 from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
 
-LANDMARK_WEIGHT = 1e4
-_VOLUME_SHARE = 0.5
-_RELATIVE_DECREASE = 1e-4
-_CG_TOLERANCE = 1e-3
-_CG_ITERATIONS = 400
-_BACKTRACKS = 12
+LANDMARK_WEIGHT = 1e4  # a larger one lowers the residual little and slows down conjugate gradients
+_VOLUME_SHARE = 0.5  # of the energy; the rest is the conformal term
+_RELATIVE_DECREASE = 1e-4  # of the energy, predicted for a full step; less ends the iteration
+_CG_TOLERANCE = 1e-3  # relative; a Newton direction need not be more accurate than its quadratic model
+_CG_ITERATIONS = 400  # at most
+_BACKTRACKS = 12  # halvings of the step before the line search gives up
 
 
 class FoldFreeFitter:
-    """Fits maps of one mesh to landmarks; everything that does not depend on the targets is set up once.
+    """Fits maps of one mesh to landmark targets. Everything that does not depend on the targets is set up once.
 
     Parameters
     ----------
     mesh : TetMesh
-    landmarks : (n, N) sparse array
-        Rows of barycentric coordinates: landmark i is at ``landmarks[i] @ values``.
+        A mesh of the unit cube.
+    landmarks : (n, N) sparse
+        Barycentric coordinates of the landmarks: a map with values (N, 3) sends them to ``landmarks @ values``.
     weights : (n,)
-        Landmark weights with sum 1.
+        Positive weights of the landmarks, with the sum 1.
     """
 
     def __init__(self, mesh: TetMesh, landmarks: csr_array, weights: Floats) -> None:
@@ -47,14 +48,26 @@ class FoldFreeFitter:
         self._weights = weights
         self._free = ~mesh.on_cube_face
         self._pattern = StiffnessPattern(mesh.tets, len(mesh.points))
-        # Landmarks lie inside tetrahedra, so their normal matrix fits into the pattern of the mesh.
+        # Landmarks lie inside tetrahedra, so their normal matrix has the sparsity pattern of the mesh.
         self._landmark_matrix = csr_array(landmarks.T @ diags_array(weights) @ landmarks)
         self._landmark_blocks = self._blocks_of(self._landmark_matrix)
 
     def fit(self, start: Floats, targets: Floats, most_iterations: int) -> Floats:
-        """Draw the landmarks towards ``targets`` (n, 3), starting at a map without folds, ``start`` (N, 3).
+        """Minimize the energy, starting at a map without folds.
 
-        Returns the values of a map without folds. Boundary coordinates that the cube's faces hold stay as they are.
+        Parameters
+        ----------
+        start : (N, 3)
+            Values of a map without folds, cube units. Coordinates fixed by the cube's faces do not change.
+        targets : (n, 3)
+            Targets of the landmarks, cube units.
+        most_iterations : int
+            Largest number of Gauss-Newton steps.
+
+        Returns
+        -------
+        (N, 3)
+            Values of a map without folds.
         """
         values = start
         misfit = self.misfit(start, targets)
@@ -68,18 +81,18 @@ class FoldFreeFitter:
         return values
 
     def residuals(self, values: Floats, targets: Floats) -> Floats:
-        """(n, 3) landmark positions minus targets."""
+        """(n, 3) residuals: landmark positions under a map with ``values`` (N, 3), minus their targets (n, 3)."""
         return np.asarray(self.landmarks @ values - targets)
 
     def misfit(self, origin: Floats, targets: Floats) -> Misfit:
-        """What maps cost for missing ``targets`` (n, 3), to be asked for near the map ``origin`` (N, 3)."""
+        """The quadratic landmark penalty for ``targets`` (n, 3), expanded about the map ``origin`` (N, 3)."""
         residuals = self.residuals(origin, targets)
         at_origin = 0.5 * LANDMARK_WEIGHT * float(self._weights @ (residuals**2).sum(axis=1))
         slope = LANDMARK_WEIGHT * (self.landmarks.T @ (self._weights[:, None] * residuals))
         return Misfit(origin, at_origin, np.asarray(slope), self._landmark_matrix)
 
     def _energy(self, values: Floats, misfit: Misfit) -> float:
-        """Energy of a map, infinite where it has a fold."""
+        """Energy of a map; infinite if the map has a fold."""
         jacobians = self.mesh.jacobians(values)
         determinant = determinants(jacobians)
         if determinant.min() <= 0.0:
@@ -88,7 +101,7 @@ class FoldFreeFitter:
         return float(self.mesh.volumes @ density) + misfit.at(values)[0]
 
     def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
-        """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3)."""
+        """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3) of the Gauss-Newton matrix."""
         jacobians = self.mesh.jacobians(values)
         volumes = self.mesh.volumes
         squares = np.einsum("mij,mij->m", jacobians, jacobians)
@@ -123,7 +136,7 @@ class FoldFreeFitter:
     def _line_search(
         self, values: Floats, step: Floats, energy: float, slope: float, misfit: Misfit
     ) -> tuple[float, Floats]:
-        """The first of the lengths 1, 1/2, 1/4, ... that lowers the energy enough, and where it leads; 0 if none."""
+        """The first length of 1, 1/2, 1/4, ... that satisfies the Armijo condition, and its map; length 0 if none."""
         length = 1.0
         for _ in range(_BACKTRACKS):
             moved = values + length * step
@@ -133,7 +146,7 @@ class FoldFreeFitter:
         return 0.0, values
 
     def _blocks_of(self, matrix: csr_array) -> Floats:
-        """(entries, 3, 3) multiples of the identity on the mesh's pattern."""
+        """(entries, 3, 3) blocks, multiples of the identity, of a scalar matrix in the mesh's sparsity pattern."""
         pattern = self._pattern.assemble(np.zeros((len(self.mesh.tets), 4, 4)))
         rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
         values = np.zeros(len(pattern.indices))
@@ -146,16 +159,18 @@ class FoldFreeFitter:
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """The quadratic cost of missed landmarks, known by its value and slope at one map: no landmark is looked at again.
+    """The quadratic landmark penalty, expanded about one map, so that it can be evaluated without the landmarks.
 
     Parameters
     ----------
     origin : (N, 3)
+        Values of the map about which it is expanded.
     at_origin : float
+        Penalty of that map.
     slope : (N, 3)
-        Gradient at the origin.
+        Gradient of the penalty there.
     matrix : (N, N) sparse
-        The landmarks' normal matrix, weights included.
+        Weighted normal matrix of the landmarks.
     """
 
     origin: Floats
@@ -164,7 +179,7 @@ class Misfit:
     matrix: csr_array
 
     def at(self, values: Floats) -> tuple[float, Floats]:
-        """Cost and gradient (N, 3) of a map (N, 3)."""
+        """Penalty of a map with ``values`` (N, 3), and its gradient (N, 3)."""
         change = values - self.origin
         curved = LANDMARK_WEIGHT * (self.matrix @ change)
         cost = self.at_origin + float((change * (self.slope + 0.5 * curved)).sum())
@@ -173,7 +188,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class _Density:
-    """Energy density and its derivatives: stress = linear * J + slope * cof(J)."""
+    """Energy density of each element and its derivatives; the stress is linear * J + slope * cof(J)."""
 
     density: Floats
     linear: Floats
@@ -188,7 +203,7 @@ def _density(squares: Floats, determinant: Floats) -> Floats:
 
 
 def _density_derivatives(squares: Floats, determinant: Floats) -> _Density:
-    """First and second derivatives with respect to |J|^2 and det J."""
+    """The density and its first and second derivatives with respect to |J|² and det J."""
     shape = (1.0 - _VOLUME_SHARE) / 3.0 * determinant ** (-2.0 / 3.0)
     shape_slope = -2.0 / 3.0 * shape / determinant
     shape_curvature = -5.0 / 3.0 * shape_slope / determinant
@@ -200,10 +215,10 @@ def _density_derivatives(squares: Floats, determinant: Floats) -> _Density:
 def _projected_blocks(
     volumes: Floats, gradients: Floats, jacobians: Floats, cofactor: Floats, squares: Floats, terms: _Density
 ) -> Floats:
-    """(M, 4, 4, 3, 3) element blocks of the Gauss-Newton matrix, positive semi-definite.
+    """(M, 4, 4, 3, 3) positive semi-definite element blocks of the Gauss-Newton matrix.
 
-    With det J linearised the Hessian is linear * I + mixed (J C^T + C J^T) + curvature C C^T on the span of J and
-    its cofactor C, and a multiple of the identity elsewhere; the 2 x 2 part is projected in closed form.
+    With det J linearized, the Hessian is linear * I + mixed (J Cᵀ + C Jᵀ) + curvature C Cᵀ on the span of J and its
+    cofactor matrix C, and a multiple of the identity on the complement. The 2 x 2 part is projected in closed form.
     """
     norm = np.sqrt(np.maximum(squares, 1e-300))
     first = jacobians / norm[:, None, None]
@@ -215,8 +230,8 @@ def _projected_blocks(
     corner = terms.mixed * norm * across + terms.curvature * along * across
     bottom = terms.curvature * across**2
     top, corner, bottom = _projected_2x2(terms.linear, top, corner, bottom)
-    # Rows of the factors: gradients contracted with the two directions. A block row of all corners and axes at once
-    # is one small product for each tetrahedron.
+    # The factors are the gradients contracted with the two directions. All blocks of a tetrahedron are computed by one
+    # small matrix product.
     factors = np.stack([gradients @ first.transpose(0, 2, 1), gradients @ second.transpose(0, 2, 1)], axis=3)
     factors = factors.reshape(-1, 12, 2)
     mixed = volumes[:, None, None] * np.stack([top, corner, corner, bottom], axis=1).reshape(-1, 2, 2)
@@ -231,7 +246,7 @@ def _projected_blocks(
 def _projected_2x2(
     shift: Floats, top: Floats, corner: Floats, bottom: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Clamp the eigenvalues of shift * I + [[top, corner], [corner, bottom]] at a small part of shift."""
+    """Clamp the eigenvalues of shift * I + [[top, corner], [corner, bottom]] to at least 1 % of shift."""
     mean, half = 0.5 * (top + bottom), 0.5 * (top - bottom)
     radius = np.hypot(half, corner)
     floor = -0.99 * shift
@@ -246,7 +261,7 @@ def _diagonal_blocks(matrix: bsr_array) -> Floats:
 
 
 def _restricted(blocks: Floats, free: Bools) -> Floats:
-    """Diagonal blocks with held coordinates decoupled."""
+    """Diagonal blocks in which fixed coordinates are decoupled from free ones."""
     kept = blocks * (free[:, :, None] & free[:, None, :])
     kept[:, np.arange(3), np.arange(3)] += ~free
     return np.asarray(kept)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folds of one map covered by another that has none: the other map where the folds are, a gradual change around."""
+"""Repairs the folds of a map by blending in a fold-free one around them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,27 @@ from ..arrays import Floats
 from ..numerics.rotations import determinants
 from ..tets.mesh import TetMesh
 
-_ROUNDS = 6
+_ROUNDS = 6  # each lets the blended region grow; folds that need more are repaired by a fit instead
 
 
 def covered(mesh: TetMesh, values: Floats, other: Floats) -> Floats | None:
-    """Values (N, 3) without folds, or None where folds are left after some rounds.
+    """Replace a map by a fold-free one where it has folds.
 
-    Vertices of folded tetrahedra go to the other map, their neighbours halfway; where that folds others, they follow.
+    Vertices of folded tetrahedra take the values of the other map, and their neighbors the mean of both. If that folds
+    further tetrahedra, these are treated in the next round.
 
     Parameters
     ----------
+    mesh : TetMesh
     values : (N, 3)
-        A map with few folds.
+        Values of a map with few folds.
     other : (N, 3)
-        A map near it without folds.
+        Values of a fold-free map close to it.
+
+    Returns
+    -------
+    (N, 3) or None
+        Values without folds; None if folds are left after all rounds.
     """
     around = mesh.incidence
     share = np.zeros(len(mesh.points))

@@ -28,7 +28,12 @@ _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, M
 def fingerprint(pair: KeyPair) -> str:
     """A digest of the keys, faces and edges: a stored map belongs to keys with the same digest."""
     digest = hashlib.sha256()
-    for array in (pair.key0, pair.key1, pair.faces, pair.edges):
+    arrays = [pair.key0, pair.key1, pair.faces, pair.edges]
+    polygons = np.unique(pair.polygons, return_index=True, return_inverse=True)
+    # Of triangles alone, as before there were polygons; their numbers do not matter, but which are the same.
+    if len(polygons[0]) < len(pair.faces):
+        arrays.append(polygons[1][polygons[2].ravel()])
+    for array in arrays:
         digest.update(np.int64(len(array)).tobytes())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()

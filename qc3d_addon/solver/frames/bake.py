@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -39,6 +39,11 @@ class Bake:
     report: BakeReport
     measures: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     maps: tuple[Floats, ...] = ()
+
+    def of_first(self, count: int) -> Bake:
+        """The bake of the first ``count`` of its vertices, of which the others are mirror images."""
+        measures = {name: values[:, :count] for name, values in self.measures.items()}
+        return replace(self, frames=self.frames[:, :count], report=self.report.of_first(count), measures=measures)
 
     def at(self, chosen: Ints) -> Bake:
         """The bake of some of its frames, by their numbers (c,)."""

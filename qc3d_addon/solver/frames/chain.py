@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..collision.colliders import CollisionResolver, PosedCollider
 from ..fit.fitted_map import FittedMap, Residual
+from ..keys.halves import held_on_planes
 from ..keys.keypair import KeyPair
 from ..settings import FrameOptions
 from ..support.memory import peak_memory_mb
@@ -22,7 +23,7 @@ from .easing import eased
 from .frame import Frame
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
-from .report import BakeReport, Folds, crossing_notes, welding_notes
+from .report import BakeReport, Folds, crossing_notes, mirror_notes, welding_notes
 
 
 def chain_frames(
@@ -37,7 +38,8 @@ def chain_frames(
     Parameters
     ----------
     pairs : sequence of KeyPair
-        Consecutive pairs of one mesh: the second key of each is the first of the next.
+        Consecutive pairs of one mesh: the second key of each is the first of the next. Of a mirrored whole, frames are
+        those of the mesh's own vertices.
     fits : sequence of FittedMap
         A fit for each pair; empty in mode ``straight``.
     times : (k,)
@@ -73,6 +75,8 @@ def chain_frames(
     yield Progress("frames", 1.0)
     ordered = [made[index] for index in range(len(wanted))]
     frames = np.array([frame.positions for frame in ordered]).reshape(-1, *pairs[0].key0.shape)
+    for frame, number, time in zip(frames, segments.tolist(), local.tolist(), strict=True):
+        frame[...] = held_on_planes(frame, time, pairs[number].key0, pairs[number].key1, pairs[number].planes)
     measures = {}
     with timed(seconds, "measure"):
         worst = worst_stretch(pairs, segments, frames)
@@ -80,7 +84,7 @@ def chain_frames(
             measures = measure(fits, segments, frames, [frame.values for frame in ordered if frame.values is not None])
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
-    notes += welding_notes(pairs) + crossing_notes(crossings, wanted)
+    notes += mirror_notes(pairs[0]) + welding_notes(pairs) + crossing_notes(crossings, wanted)
     notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",
@@ -90,7 +94,7 @@ def chain_frames(
         quality=fits[0].options.quality if fits else None,
         vertices=len(pairs[0].key0),
         tetrahedra=sum(len(fitted.mesh.tets) for fitted in fits),
-        welded=[len(pair.key0) - len(pair.welding[0]) for pair in pairs],
+        welded=[len(pair.own.key0) - len(pair.own.welding[0]) for pair in pairs],
         folds=Folds(None, None),
         crossings=crossings,
         certificates=[frame.certificate for frame in ordered if frame.certificate is not None],
@@ -109,7 +113,7 @@ def chain_frames(
         notes += crossing_notes(report.collider_crossings, wanted, "the colliders")
     report.notes = list(dict.fromkeys(notes))
     maps = tuple(frame.values for frame in ordered if frame.values is not None)
-    return Bake(wanted, frames, report, measures, maps)
+    return Bake(wanted, frames, report, measures, maps).of_first(len(pairs[0].own.key0))
 
 
 def _put_keys(made: dict[int, Frame], members: Ints, times: Floats, pair: KeyPair) -> float:

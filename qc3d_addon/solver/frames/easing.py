@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Easing curves: how far along the way an in-between is at a time."""
+"""Easing curves: the fraction of the motion that is done at each time."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from ..settings import Easing
 
 
 def eased(times: Floats, easing: Easing) -> Floats:
-    """(k,) part of the way, 0..1, at ``times`` (k,) in 0..1; 0 and 1 stay as they are.
+    """(k,) fraction of the motion, 0..1, that is done at ``times`` (k,) in 0..1.
 
     ``ease-in`` starts slowly and ``ease-out`` ends slowly (quadratic); ``ease-in-out`` does both (cubic).
+
+    Examples
+    --------
+    >>> eased(np.array([0.0, 0.5, 1.0]), "ease-in")
+    array([0.  , 0.25, 1.  ])
     """
     if easing == "ease-in":
         return np.asarray(times**2)
@@ -25,7 +30,7 @@ def eased(times: Floats, easing: Easing) -> Floats:
 
 
 def uneased(parts: Floats, easing: Easing) -> Floats:
-    """(k,) times, 0..1, at which ``eased`` has come to ``parts`` (k,) of the way."""
+    """(k,) times, 0..1, at which the fractions ``parts`` (k,) of the motion are done: the inverse of ``eased``."""
     if easing == "ease-in":
         return np.asarray(np.sqrt(parts))
     if easing == "ease-out":

@@ -20,5 +20,6 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
     OSError
         If the file cannot be written.
     """
-    ends = {"key0": pairs[0].key0, "key1": pairs[-1].key1}
-    write_arrays(path, {"faces": pairs[0].faces, "frames": frames, "times": times, **ends})
+    own = [pair.own for pair in pairs]
+    ends = {"key0": own[0].key0, "key1": own[-1].key1}
+    write_arrays(path, {"faces": own[0].faces, "frames": frames, "times": times, **ends})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a collider is at the times of the frames: in its place, or, where it moves, on a path of its own."""
+"""The collider at the times of the frames: fixed, or following its own shapes from key to key."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from .modes import needs_fits
 
 
 class Following:
-    """A collider followed from key to key: naturally, or along straight lines in mode ``straight``.
+    """A collider interpolated from key to key, by natural in-betweens, or along straight lines in mode ``straight``.
 
     Parameters
     ----------
     collider : Collider
     times : (k,)
-        Of the frames, 0..1.
+        Times of the frames, 0..1.
     fit_options : FitOptions
-        Those of the mesh; its extra turns are not the collider's.
+        Fit options of the mesh; its extra turns do not apply to the collider.
     frame_options : FrameOptions
-        Those of the mesh.
+        Frame options of the mesh.
 
     Attributes
     ----------
     fits : int
-        How many fits it takes.
+        Number of fits that are needed.
     notes : list of str
-        Sentences for the user, complete when the collider is posed.
+        Sentences for the user; complete once the collider is posed.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Following:
         return len(self._pairs)
 
     def posed(self) -> Steps[PosedCollider]:
-        """The collider at all the times."""
+        """The collider at all times."""
         if self._pairs:
             try:
                 return PosedCollider(self._collider, (yield from self._natural()))
@@ -79,7 +79,7 @@ class Following:
             fitted[ends] = yield from numbered(fit_pair(pair, self._fit_options), number, len(self._pairs))
         along = list(pairwise(self._through))
         options = FrameOptions(easing=self._easing)
-        # Its frames are few beside the mesh's own; they are made without telling how far they are.
+        # The collider's frames take little time compared with the mesh's, so their progress is not reported.
         frames = chain_frames([self._pairs[e] for e in along], [fitted[e] for e in along], self._times, options)
         return finish(frames).frames
 
@@ -97,7 +97,7 @@ class Following:
 
 
 def _names(shapes: Floats) -> tuple[str, ...]:
-    """A name for each of the collider's shapes (k, c, 3): that of an earlier one like it, but not twice in a row."""
+    """A name for each of the collider's shapes (k, c, 3); equal shapes share a name, but never two in a row."""
     names: list[str] = []
     for number, shape in enumerate(shapes):
         same = (names[other] for other in range(number - 1) if np.array_equal(shapes[other], shape))

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats
 from ..fit.fitted_map import FittedMap
 from ..numerics.rotations import determinants
-from .placement import Placement
+from .alignment import RigidMove
 from .report import Certificate
 
 
@@ -45,16 +45,16 @@ class Frame:
         time: float,
         repaired: bool,
         crossings: int | None,
-        placement: Placement | None = None,
+        move: RigidMove | None = None,
     ) -> Frame:
         """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube.
 
-        ``placement`` carries the map to the frame.
+        ``move`` carries the map to the frame.
         """
         determinant = determinants(fitted.mesh.jacobians(values))
         worst = int(np.argmin(determinant))
         middle = values[fitted.mesh.tets[worst]].mean(axis=0)[None]
-        place = fitted.embedding.from_cube(middle if placement is None else placement.apply(middle), time)[0]
+        place = fitted.embedding.from_cube(middle if move is None else move.apply(middle), time)[0]
         folds = int((determinant <= 0.0).sum())
         certificate = Certificate(time, folds, float(determinant[worst]), place.tolist(), repaired)
         return cls(positions, crossings, values, certificate)

@@ -19,13 +19,13 @@ from .frame import Frame
 
 
 class LinearMaps:
-    """Maps between the identity and a given map, P_t = (1 - t) I + t P (Chen & Lui, section 6.1).
+    """Maps between the identity and a given map, P(t) = (1 - t) I + t P (Chen & Lui, section 6.1).
 
     Parameters
     ----------
     mesh : TetMesh
     mapped : (N, 3)
-        Values of the fold-free map at the mesh's vertices.
+        Values of the fold-free map at the mesh's vertices, cube units.
     """
 
     def __init__(self, mesh: TetMesh, mapped: Floats) -> None:
@@ -35,17 +35,17 @@ class LinearMaps:
         self._reconstructor = Reconstructor(mesh)
 
     def at(self, time: float) -> Floats:
-        """(N, 3) values of the map at ``time`` in 0..1, rebuilt from the interpolated representation."""
+        """(N, 3) values of the map at ``time`` in 0..1, reconstructed from the interpolated representation."""
         stretch = (1.0 - time) * np.eye(3) + time * self._stretch
         guess = (1.0 - time) * self._mesh.points + time * self._mapped
         return self._reconstructor.rebuild(stretch, self._mesh.points, start=guess)
 
 
 class LinearFrames:
-    """Frames of mode ``linear``: the rebuilt maps at the landmarks, what the fit missed blended in.
+    """Frames of mode ``linear``: the reconstructed maps at the landmarks, with the fit's residual blended in.
 
-    The scheme is the published one, folds included: nothing promises that a rebuilt map is a bijection in space, and
-    the report counts where it is not.
+    This is the published scheme, including its folds: it does not guarantee that a reconstructed map is a bijection,
+    and the report counts where it is not.
     """
 
     notes: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class LinearFrames:
         self._missed = fitted.embedding.key1 - fitted.landmarks @ fitted.mapped
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
+        """One frame for each of ``times`` (k,) in 0..1, out of colliders; yields the finished share, 0..1."""
         made = []
         pair, still = self._fitted.pair, self._fitted.embedding.still
         for index, time in enumerate(times.tolist()):
@@ -67,7 +67,7 @@ class LinearFrames:
             values = self._maps.at(time)
             shape = self._fitted.landmarks @ values + time * self._missed
             positions = self._fitted.embedding.from_cube(shape, time)
-            # A part that both keys leave in place must not breathe with the map around it.
+            # Still vertices must not move with the map around them.
             positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
             if resolver is not None:
                 positions = resolver.cleared(index, positions, time, still)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one place that knows the modes: what makes the frames of each pair of a chain."""
+"""The modes: the only place that knows what makes the frames of each."""
 
 from __future__ import annotations
 
@@ -25,26 +25,31 @@ class FrameMaker(Protocol):
     notes: tuple[str, ...]
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
+        """One frame for each of ``times`` (k,) in 0..1, out of colliders; yields the finished share, 0..1."""
 
 
 def needs_fits(mode: Mode) -> bool:
-    """Whether frames of this mode are made from fitted maps."""
+    """Whether frames of this mode need fitted maps."""
     return mode != "straight"
 
 
 def frame_makers(
     pairs: Sequence[KeyPair], fits: Sequence[FittedMap], options: FrameOptions
 ) -> Generator[float, None, Sequence[FrameMaker]]:
-    """What makes the frames of each pair, joined without a jerk at the keys between where the mode does that.
+    """The makers of each pair's frames; in mode ``natural`` they are joined without a jerk at the inner keys.
 
     Parameters
     ----------
     pairs : sequence of KeyPair
         Consecutive pairs of one mesh.
     fits : sequence of FittedMap
-        A fit for each; not looked at in mode ``straight``.
+        The fit of each pair; ignored in mode ``straight``.
     options : FrameOptions
+
+    Yields
+    ------
+    float
+        Finished share of the work, 0..1.
     """
     if options.mode == "straight":
         return [StraightFrames(pair) for pair in pairs]

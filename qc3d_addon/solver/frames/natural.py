@@ -20,9 +20,9 @@ from ..numerics.rotation_unwrapping import Turning, swing_beside
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
+from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
-from .placement import Placement, Placer
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -55,7 +55,7 @@ class NaturalFrames:
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
-        self._placer = Placer(embedding, turns)
+        self._alignment = CalmAlignment(embedding, turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
@@ -68,13 +68,13 @@ class NaturalFrames:
 
     @property
     def rows(self) -> Ints:
-        """(m,) the mesh's triangles that have rates: those with an area in both keys."""
+        """(m,) which triangles of the pair's covering have rates: those with an area in both keys."""
         return self._surface.deformation.rows
 
     @property
     def resting(self) -> Bools:
         """(m,) whether a corner of these triangles stays in place."""
-        return np.asarray(self.still[self._fitted.pair.faces[self.rows]].any(axis=1))
+        return np.asarray(self.still[self._fitted.pair.covering[0][self.rows]].any(axis=1))
 
     @property
     def components(self) -> Ints:
@@ -107,7 +107,7 @@ class NaturalFrames:
         changed._surface = self._surface.with_end_rates(
             Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)
         )
-        changed._placer = self._placer.beside(inner)
+        changed._alignment = self._alignment.beside(inner)
         return changed
 
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
@@ -119,7 +119,7 @@ class NaturalFrames:
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
         shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
-        return self._finished(shape, time, self._placer.of(shape, time))
+        return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
@@ -134,16 +134,16 @@ class NaturalFrames:
             excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
-        placements = [self._placer.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
+        moves = [self._alignment.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
         if resolver is not None:
-            positions = yield from self._cleared(resolver, times, volumes, positions, placements)
+            positions = yield from self._cleared(resolver, times, volumes, positions, moves)
             crossings = list(in_threads(self._limit.excess, positions))
-        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, placements, crossings, strict=True))
+        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, moves, crossings, strict=True))
         return list(made)
 
-    def _certified(self, moment: tuple[float, Floats, Floats, Placement, int | None]) -> Frame:
+    def _certified(self, moment: tuple[float, Floats, Floats, RigidMove, int | None]) -> Frame:
         """The frame of a time, its map's values, its surface in the cube, where it goes and its excess of crossings."""
-        time, values, shape, placement, crossings = moment
+        time, values, shape, move, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
         found = self._volume.followed(time, values)
         repaired = self._fitted.folds(found) > 0
@@ -151,8 +151,8 @@ class NaturalFrames:
             found, repaired = values, False
         if repaired:
             found = self._fitted.unfolded(found, time)
-        positions = self._finished(shape, time, placement)
-        return Frame.of(self._fitted, positions, found, time, repaired, crossings, placement)
+        positions = self._finished(shape, time, move)
+        return Frame.of(self._fitted, positions, found, time, repaired, crossings, move)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
         """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
@@ -160,10 +160,10 @@ class NaturalFrames:
         shapes = self._shaped(self._surface, self._moments(maps, times))
         return maps, shapes, [self._limit.excess(shape) for shape in shapes]
 
-    def _finished(self, shape: Floats, time: float, placement: Placement) -> Floats:
+    def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
         """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._fitted.embedding.from_cube(placement.apply(shape), time)
+        positions = self._fitted.embedding.from_cube(move.apply(shape), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -216,7 +216,7 @@ class NaturalFrames:
         times: Floats,
         volumes: list[Floats],
         positions: list[Floats],
-        placements: list[Placement],
+        moves: list[RigidMove],
     ) -> Generator[float, None, list[Floats]]:
         """Push vertices out of the colliders and let the surface around give way, until none is too near."""
         embedding = self._fitted.embedding
@@ -226,10 +226,10 @@ class NaturalFrames:
             yield attempt / (_PUSHES + 1)
             nearby, pushed = [], []
             for index, time in enumerate(moments):
-                place = self._finished(positions[index], time, placements[index])
+                place = self._finished(positions[index], time, moves[index])
                 near, moved = resolver.pushed(index, place, time)
                 nearby.append(near & ~self.still)
-                push = placements[index].undo_vectors(embedding.vectors_to_cube(moved - place, time))
+                push = moves[index].undo_vectors(embedding.vectors_to_cube(moved - place, time))
                 pushed.append(positions[index] + np.where(nearby[-1][:, None], push, 0.0))
             if not any(near.any() for near in nearby):
                 return positions

@@ -14,7 +14,7 @@ from ..arrays import Floats, Ints
 from ..collision.self_crossings import CrossingLimit, PairCrossings
 from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
-from ..settings import FrameOptions, PlayOptions
+from ..settings import DENSE_STEPS, FrameOptions, PlayOptions
 from ..support.threads import in_threads
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.topology import sides, unique_edges, vertex_components
@@ -24,8 +24,6 @@ from .measures import worst_excess
 from .report import PlayedReport, crossing_notes
 from .weights import Weights, fewest_knots
 
-# Frames between every two keys that a tolerance chooses from.
-DENSE_STEPS = 48
 # Where it is looked at between two shapes: parts of the way from the one to the other.
 _LOOKED_AT = (0.25, 0.5, 0.75)
 # Enclosed volumes below this part of the largest have no deviation to speak of.
@@ -65,18 +63,19 @@ class Moments:
             times = np.sort(np.concatenate([shapes, 0.5 * (shapes[1:] + shapes[:-1])]))
         return cls(times, np.searchsorted(times, at_keys), np.searchsorted(times, shapes))
 
-    def chosen(self, options: PlayOptions, frames: FrameOptions, motion: Floats) -> tuple[Ints, Weights]:
-        """The moments (c,) that become shapes, and their weights, for the whole motion (k, n, 3)."""
+    def chosen(self, options: PlayOptions, frames: FrameOptions, motion: Floats) -> tuple[Ints, list[int]]:
+        """The moments (c,) that become shapes, and at which of them the path turns, for the whole motion (k, n, 3)."""
         # Only natural motions go through keys without a corner.
         corners = self.keys[1:-1].tolist() if frames.mode != "natural" else []
+        everywhere = options.weights == "hats"
         shapes = self.shapes
         if options.tolerance > 0.0:
-            wanted = [*self.keys.tolist(), *np.searchsorted(self.times, options.also_at).tolist()]
-            shapes = fewest_knots(self.times, motion, options.tolerance, wanted, corners)
-        knots = self.times[shapes]
-        if options.weights == "hats":
-            return shapes, Weights.hats(knots)
-        return shapes, Weights.smooth(knots, [shapes.tolist().index(corner) for corner in corners])
+            also = np.abs(self.times[:, None] - np.array(options.also_at)).argmin(axis=0)
+            wanted = [*self.keys.tolist(), *also.tolist()]
+            shapes = fewest_knots(self.times, motion, options.tolerance, wanted, None if everywhere else corners)
+        if everywhere:
+            return shapes, list(range(1, len(shapes) - 1))
+        return shapes, [shapes.tolist().index(corner) for corner in corners]
 
 
 def played(
@@ -96,8 +95,9 @@ def played(
     pairs, fits
         Consecutive pairs of keys, and their fits; none in mode ``straight``.
     """
-    chosen, weights = moments.chosen(options, frames, bake.frames)
+    chosen, corners = moments.chosen(options, frames, bake.frames)
     shapes = bake.at(chosen)
+    weights = Weights.smooth(shapes.times, corners)
     missed = np.linalg.norm(weights.played(shapes.frames, bake.times) - bake.frames, axis=2).max(axis=1, initial=0.0)
     worst = int(missed.argmax())
     positions, segments, local = _between(weights.knots, frames, len(pairs))
@@ -117,6 +117,7 @@ def played(
             folds = max([folds, *map(fits[number].folds_left, shown_maps, local[members].tolist())])
     report = PlayedReport(
         weights=options.weights,
+        corners=corners,
         positions=len(positions),
         distance=float(missed[worst]) / pairs[0].diagonal,
         distance_at=float(bake.times[worst]),

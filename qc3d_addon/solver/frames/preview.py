@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes at any time from frames that are dense enough, in a fraction of a millisecond and without scipy."""
+"""Shapes at any time from frames that are dense enough, in a fraction of a millisecond."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..settings import Easing
 from .easing import eased
+from .weights import Weights
 
 Singles = NDArray[np.float32]
 
@@ -69,13 +70,14 @@ class PreviewCurve:
         result -= (part * part * rest) * self._slopes[pair, step + 1]
         return np.asarray(result)
 
-    def beyond_blend(self, time: float, steps: int) -> Singles:
-        """(n, 3) what the curve adds at ``time`` to the straight blend of its positions at ``steps`` even steps."""
-        along = min(max(time, 0.0), 1.0) * steps
-        before = min(int(along), steps - 1)
-        part = np.float32(along - before)
-        first, second = self.at(before / steps), self.at((before + 1) / steps)
-        return self.at(time) - ((np.float32(1.0) - part) * first + part * second)
+    def beyond(self, time: float, weights: Weights) -> Singles:
+        """(n, 3) what the curve adds at ``time`` to what a control with these weights plays of its own positions."""
+        time = min(max(time, 0.0), 1.0)
+        added = self.at(time)
+        for weight, knot in zip(weights.at(time)[0].tolist(), weights.knots.tolist(), strict=True):
+            if weight:
+                added -= np.float32(weight) * self.at(knot)
+        return added
 
 
 def _slope_operator(steps: int) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import Residual
+from ..keys.halves import on_plane
 from ..keys.keypair import KeyPair
 
 T = TypeVar("T")
@@ -75,6 +76,8 @@ class PlayedReport:
     ----------
     weights
         ``smooth`` or ``hats``.
+    corners
+        Numbers of the shapes at which the path turns.
     positions
         In how many places it was looked at.
     distance
@@ -95,6 +98,7 @@ class PlayedReport:
     """
 
     weights: str
+    corners: list[int]
     positions: int
     distance: float
     distance_at: float
@@ -169,6 +173,11 @@ class BakeReport:
         """The report as plain values that can be written as JSON."""
         return asdict(self)
 
+    def of_first(self, count: int) -> BakeReport:
+        """The report where all vertices but the first ``count`` are mirror images of these."""
+        worst = replace(self.worst_stretch, vertex=self.worst_stretch.vertex % count)
+        return replace(self, vertices=count, worst_stretch=worst)
+
     def at(self, chosen: list[int]) -> BakeReport:
         """The report of some of the frames, by their numbers."""
         worst = self.worst_stretch
@@ -205,6 +214,16 @@ def welding_notes(pairs: Sequence[KeyPair]) -> list[str]:
     ]
 
 
+def mirror_notes(pair: KeyPair) -> list[str]:
+    """A sentence about a mesh that was taken as one half of a mirrored whole."""
+    if not pair.planes:
+        return []
+    count = len(pair.own.key0)
+    held = [np.count_nonzero(on_plane(pair.key0, pair.key1, count, plane)) for plane in range(len(pair.planes))]
+    planes = "a plane" if len(held) == 1 else f"{len(held)} planes"
+    return [f"The mesh moves as one with its mirror image across {planes}; {sum(held)} vertices stay on the seam."]
+
+
 def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
     return None if counts is None else [counts[index] for index in chosen]
 
@@ -222,7 +241,6 @@ def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str 
     if None in crossings:
         notes.append(
             f"Whether the mesh crosses {subject} is not known in {crossings.count(None)} of {len(crossings)} frames: "
-            "so many triangles lie over each other there that looking would take too long; remove those that are "
-            "there many times over."
+            "so many triangles overlap there that searching would take too long; remove repeated triangles."
         )
     return notes

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mode ``straight``: every vertex on the line between its keys, also where no map of a volume leads there."""
+"""Mode ``straight``: every vertex moves along a straight line; it works even where no map of a volume exists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .frame import Frame
 
 
 class StraightFrames:
-    """Frames of a pair of keys without any fit; colliders are kept clear of vertex by vertex."""
+    """Frames of a pair of keys without a fit; collisions are resolved vertex by vertex."""
 
     notes: tuple[str, ...] = ()
 
@@ -26,7 +26,7 @@ class StraightFrames:
         self._crossings = PairCrossings(pair)
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
+        """One frame for each of ``times`` (k,) in 0..1, out of colliders; yields the finished share, 0..1."""
         made = []
         pair = self._pair
         for index, time in enumerate(times.tolist()):
@@ -39,6 +39,6 @@ class StraightFrames:
 
 
 def _blended(key0: Floats, key1: Floats, time: float) -> Floats:
-    """(n, 3) positions on the straight lines; what is alike in both keys stays bit for bit, and nothing overflows."""
+    """(n, 3) positions on straight lines; equal coordinates stay equal bit for bit, and nothing overflows."""
     half = time * (key1 / 2.0 - key0 / 2.0)
     return np.asarray(key0 + half + half)

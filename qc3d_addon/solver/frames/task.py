@@ -19,7 +19,7 @@ from ..fit.fit_pair import fit_pair
 from ..fit.fitted_map import FittedMap
 from ..fit.storage import from_bytes, to_bytes
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
-from ..settings import FitOptions, FrameOptions, PlayOptions
+from ..settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from ..support.memory import estimated_mb, require_memory
 from ..support.progress import Steps, numbered, timed
 from .bake import Bake, checked_times
@@ -72,8 +72,12 @@ class Task:
         frame_options: FrameOptions | None = None,
         times: ArrayLike = (),
         collider: Collider | None = None,
+        polygons: ArrayLike | None = None,
+        mirror: Mirror = "auto",
     ) -> Task:
         """A task from the shapes (n, 3) of the keys by name, the triangles (m, 3) and the loose edges (e, 2).
+
+        ``polygons`` (m,) and ``mirror`` are those of ``consecutive_pairs``.
 
         Raises
         ------
@@ -81,7 +85,7 @@ class Task:
             If two keys that follow each other cannot be used.
         """
         return cls(
-            consecutive_pairs(shapes, faces, edges, through),
+            consecutive_pairs(shapes, faces, edges, through, polygons, mirror),
             tuple(through),
             fit_options or FitOptions(),
             frame_options or FrameOptions(),
@@ -172,5 +176,6 @@ def carry_out(task: Task) -> Steps[Outcome]:
         bake.report.notes += following.notes
     if task.play is not None and task.moments is not None:
         with timed(bake.report.seconds, "played"):
-            bake = played(bake, task.moments, pairs, fitted, task.play, task.frame_options)
+            own = [pair.own for pair in pairs]
+            bake = played(bake, task.moments, own, fitted, task.play, task.frame_options)
     return Outcome(stored, bake)

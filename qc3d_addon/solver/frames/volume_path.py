@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map of the cube on its way from the identity to the fitted map, rotation kept."""
+"""Maps of the cube between the identity and the fitted map, with interpolated rotations."""
 
 from __future__ import annotations
 
@@ -21,25 +21,26 @@ from ..settings import StretchLaw
 from ..support.threads import batches, in_threads
 from ..tets.mesh import TetMesh
 
-_MAPS_AT_ONCE = 4
+_MAPS_AT_ONCE = 4  # solved together; more would wait for each other and gain little
 
 
 class VolumePath:
-    """Maps between the identity and a fitted map by interpolated rotations and stretches.
+    """Maps between the identity and a fitted map, from interpolated rotations and stretches.
 
-    Values minimise ``sum v w |grad f - R_t P_t|^2`` over the tetrahedra with the sliding boundary of the cube, with R_t
-    from ``turning``. The matrix does not depend on the time and is factored once per coordinate.
+    The map f minimizes ``sum v w |grad f - R(t) P(t)|^2`` over the tetrahedra, with their volumes v and weights w, for
+    the sliding boundary of the cube. The matrix does not depend on the time and is factored once for each coordinate.
 
     Parameters
     ----------
     mesh : TetMesh
     maps : (K + 1, N, 3)
-        Maps without folds that were fitted on the way, evenly spaced in time: the identity first, the fitted map last.
+        Values of the fold-free maps that were fitted along the way, evenly spaced in time; the first is the identity.
     turning : Turning
-        How the tetrahedra turn.
+        Unwrapped rotations R of the tetrahedra.
     insideness : (M,)
-        What the tetrahedra count besides their volume: most inside the object.
+        Weights w of the tetrahedra: 1 inside the object, small outside.
     law : StretchLaw
+        How the stretches P are interpolated.
     """
 
     def __init__(self, mesh: TetMesh, maps: Floats, turning: Turning, insideness: Floats, law: StretchLaw) -> None:
@@ -58,18 +59,18 @@ class VolumePath:
             rows = matrix[free]
             return free, factored(csr_array(rows[:, free])), rows[:, resting] @ mesh.points[resting, coordinate]
 
-        # For each coordinate the vertices that are free to move along it, the factors, and the load of the others.
+        # For each coordinate: the vertices that may move along it, the factors, and the load of the fixed vertices.
         self._systems = list(in_threads(system, range(3)))
         # (K + 1, N, 3): the fitted maps minus this path.
         times = batches(np.linspace(0.0, 1.0, len(maps)).tolist(), _MAPS_AT_ONCE)
         self._missed = maps - np.concatenate(list(in_threads(self.maps_at, times)))
 
     def at(self, time: float) -> Floats:
-        """(N, 3) values of the map at ``time`` in 0..1; it may have folds where the motion is extreme."""
+        """(N, 3) values of the map at ``time`` in 0..1; it may have folds if the motion is extreme."""
         return np.asarray(self.maps_at([time])[0])
 
     def maps_at(self, times: Sequence[float]) -> Floats:
-        """(k, N, 3) values of the maps at several times, solved together: the factors pass through memory once."""
+        """(k, N, 3) values of the maps at several times, solved together: the factors are read from memory once."""
         loads = np.stack([self._load(time) for time in times])
         values = np.tile(self._mesh.points, (len(times), 1, 1))
         for coordinate, (free, factors, held_load) in enumerate(self._systems):
@@ -81,7 +82,7 @@ class VolumePath:
         return self._mesh.divergence(self._weights[:, None, None] * wanted)
 
     def followed(self, time: float, values: Floats) -> Floats:
-        """(N, 3): ``values`` at ``time`` with what this path misses of the nearest fitted maps, before and after."""
+        """(N, 3) ``values`` at ``time``, corrected by the interpolated difference of this path from the fitted maps."""
         steps = len(self._missed) - 1
         before = min(int(time * steps), steps - 1)
         part = time * steps - before

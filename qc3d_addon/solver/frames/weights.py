@@ -101,9 +101,9 @@ class Weights:
 
 
 def fewest_knots(
-    times: Floats, frames: Floats, tolerance: float, required: Sequence[int] = (), corners: Sequence[int] = ()
+    times: Floats, frames: Floats, tolerance: float, required: Sequence[int] = (), corners: Sequence[int] | None = ()
 ) -> Ints:
-    """As few knots, not always even, as play all frames within a tolerance with smooth weights.
+    """As few knots, not always even, as play all frames within a tolerance.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def fewest_knots(
     required : sequence of int
         Frames that are knots in any case, such as those at keys; the first and the last always are.
     corners : sequence of int
-        Of those, the frames at which the path turns.
+        Of those, the frames at which the path turns; None for all knots, as with hats.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def fewest_knots(
     Knots are added where the path is farthest from its frames; then fewer are tried where the path bends most evenly
     between them, with a density that follows the fourth root of its fourth derivative (de Boor 1978, chapter XII).
     """
-    fixed = sorted({0, *required, *corners, len(times) - 1})
+    fixed = sorted({0, *required, *(corners or ()), len(times) - 1})
     greedy = list(fixed)
     while (missed := _missed(times, frames, greedy, corners)).max() > tolerance and len(greedy) < len(times):
         greedy = sorted({*greedy, int(missed.argmax())})
@@ -146,9 +146,10 @@ def _checked(knots: ArrayLike) -> Floats:
     return places
 
 
-def _missed(times: Floats, frames: Floats, knots: Sequence[int], corners: Sequence[int]) -> Floats:
-    """(d,) how far the smooth path through the knots is from each frame; 0 at the knots."""
-    weights = Weights.smooth(times[list(knots)], [knots.index(corner) for corner in corners])
+def _missed(times: Floats, frames: Floats, knots: Sequence[int], corners: Sequence[int] | None) -> Floats:
+    """(d,) how far the path through the knots is from each frame; 0 at the knots."""
+    turning = range(1, len(knots) - 1) if corners is None else [knots.index(corner) for corner in corners]
+    weights = Weights.smooth(times[list(knots)], turning)
     missed = np.linalg.norm(weights.played(frames[list(knots)], times) - frames, axis=2).max(axis=1, initial=0.0)
     missed[list(knots)] = 0.0
     return np.asarray(missed)

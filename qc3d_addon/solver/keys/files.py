@@ -7,16 +7,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files.npz import Archive, Header, open_archive
-from ..settings import Quality
+from ..settings import Mirror, Quality
 from ..support.memory import estimated_mb, machine_limit_mb, require_memory
 from .keypair import Ends, KeyPair, consecutive_pairs
 
 
 def read_pairs(
-    path: Path, names: Sequence[str], *, frames: int = 0, quality: Quality = "normal", needs_fits: bool = True
+    path: Path,
+    names: Sequence[str],
+    *,
+    frames: int = 0,
+    quality: Quality = "normal",
+    needs_fits: bool = True,
+    mirror: Mirror = "none",
 ) -> dict[Ends, KeyPair]:
     """Read the pairs of consecutive shapes of one mesh, by the names of their two ends.
 
@@ -24,7 +34,9 @@ def read_pairs(
     ----------
     path : Path
         An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
-        of the names. Other arrays are ignored; pickled objects are refused.
+        of the names; and, if it has them, ``polygons``: for each triangle the number of its polygon (m,), or the
+        corners of polygons (p, c), short ones filled up with -1, in the order of their triangles. Other arrays are not
+        looked at; pickled objects are refused.
     names : sequence of str
         Names of two or more shapes, no name twice in a row.
     frames : int
@@ -34,6 +46,8 @@ def read_pairs(
     needs_fits : bool
         Whether the pairs will be fitted. These three decide how much memory is needed, which is checked before the
         arrays are read.
+    mirror : Mirror or sequence of MirrorPlane
+        Whether the mesh is one half; see ``consecutive_pairs``.
 
     Raises
     ------
@@ -41,27 +55,68 @@ def read_pairs(
         If the file cannot be read, lacks an array or a shape of that name, or holds unusable keys; or if the machine
         does not have enough memory.
     """
+    pairs = len(set(pairwise(names)))
+    shapes, faces, polygons = read_shapes(
+        path, names, pairs=pairs, frames=frames, quality=quality, needs_fits=needs_fits
+    )
+    return consecutive_pairs(shapes, faces, None, names, polygons, mirror)
+
+
+def read_shapes(
+    path: Path,
+    names: Sequence[str],
+    *,
+    pairs: int = 0,
+    frames: int = 0,
+    quality: Quality = "normal",
+    needs_fits: bool = True,
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any], NDArray[Any] | None]:
+    """Shapes (n, 3) of one mesh by their names, its triangles (m, 3), and their polygons (m,) where the file has them.
+
+    See ``read_pairs``; memory is checked for so many ``pairs``.
+    """
     with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
         known = _shape_names(archive, path)
         for name in names:
             if name not in known:
                 raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
         arrays = {name: f"V{known.index(name)}" for name in names}
-        headers = archive.headers(["faces", *dict.fromkeys(arrays.values())])
+        polygons = ["polygons"] if "polygons" in archive else []
+        headers = archive.headers(["faces", *polygons, *dict.fromkeys(arrays.values())])
         for name, array in arrays.items():
             _require_coordinates(headers[array], name, path)
         vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
-        pairs = len(set(pairwise(names)))
         needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
         if limit := machine_limit_mb():
             require_memory(needed, limit, vertices)
         found = archive.read(headers)
-    return consecutive_pairs({name: found[array] for name, array in arrays.items()}, found["faces"], None, names)
+    labels = polygon_labels(found["polygons"], found["faces"]) if polygons else None
+    return {name: found[array] for name, array in arrays.items()}, found["faces"], labels
 
 
 def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") -> KeyPair:
     """Read the pair of two shapes by their names; see ``read_pairs``."""
     return read_pairs(path, (first, second), quality=quality)[first, second]
+
+
+def polygon_labels(polygons: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
+    """(m,) the polygon of each triangle (m, 3), from that or from the corners of all polygons (p, c).
+
+    Raises
+    ------
+    InputError
+        If the triangles are not those of the polygons in their order.
+    """
+    if polygons.ndim != 2:
+        return polygons
+    counts = (polygons >= 0).sum(axis=1) if polygons.dtype.kind in "iu" else np.zeros(len(polygons), dtype=np.int64)
+    labels = np.repeat(np.arange(len(polygons)), np.maximum(counts - 2, 0))
+    if faces.shape != (len(labels), 3) or not (faces[:, :, None] == polygons[labels][:, None, :]).any(axis=2).all():
+        raise InputError(
+            f"The triangles are not those of the {len(polygons)} polygons one after the other, each with two fewer "
+            "than it has corners; give the polygon of each triangle instead."
+        )
+    return labels
 
 
 def _shape_names(archive: Archive, path: Path) -> list[str]:

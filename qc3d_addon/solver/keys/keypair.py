@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import hypot
@@ -15,7 +15,10 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..errors import InputError, naming_pair
+from ..settings import Mirror
+from ..triangles.polygons import covering, flat_quads
 from ..triangles.topology import sides, welded
+from .halves import MirrorPlane, Whole, mirror_planes
 
 # The names of the first and the second key of a pair.
 Ends = tuple[str, str]
@@ -44,6 +47,11 @@ class KeyPair:
         Triangles; may be empty. Polygons are triangulated by the caller.
     edges : (e, 2) int64
         Edges that belong to no face and keep their length; may be empty.
+    polygons : (m,) int64
+        Which triangles belong together: those of a quad, or of a polygon of more corners, have the same number.
+    planes : tuple of MirrorPlane
+        Where the user's mesh is one half only: across which planes it was mirrored. The mesh's own vertices and
+        triangles come first, the images after them.
 
     Examples
     --------
@@ -57,10 +65,21 @@ class KeyPair:
     key1: Floats
     faces: Ints
     edges: Ints
+    polygons: Ints
+    planes: tuple[MirrorPlane, ...] = ()
 
     @classmethod
-    def checked(cls, key0: ArrayLike, key1: ArrayLike, faces: ArrayLike, edges: ArrayLike | None = None) -> KeyPair:
+    def checked(
+        cls,
+        key0: ArrayLike,
+        key1: ArrayLike,
+        faces: ArrayLike,
+        edges: ArrayLike | None = None,
+        polygons: ArrayLike | None = None,
+    ) -> KeyPair:
         """Validate arrays of any origin and make a pair of them.
+
+        Without ``polygons``, two triangles that make a flat quad in both keys are taken as one.
 
         Raises
         ------
@@ -76,7 +95,20 @@ class KeyPair:
             raise InputError("The mesh has no vertices; there is nothing to move.")
         triangles = _indices(faces, 3, len(first), "faces")
         wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
-        return cls(first, second, triangles, wires)
+        if polygons is None:
+            return cls(first, second, triangles, wires, flat_quads([first, second], triangles))
+        return cls(first, second, triangles, wires, _labels(polygons, len(triangles)))
+
+    @cached_property
+    def own(self) -> KeyPair:
+        """The user's own mesh: this pair, or the half that it was mirrored from."""
+        if not self.planes:
+            return self
+        vertices, triangles, wires = (
+            slice(len(array) >> len(self.planes)) for array in (self.key0, self.faces, self.edges)
+        )
+        keys = (self.key0[vertices], self.key1[vertices])
+        return KeyPair(*keys, self.faces[triangles], self.edges[wires], self.polygons[triangles])
 
     @cached_property
     def diagonal(self) -> float:
@@ -104,6 +136,11 @@ class KeyPair:
         return np.asarray(vertices[group[self.faces]])
 
     @cached_property
+    def covering(self) -> tuple[Ints, Floats]:
+        """Triangles (k, 3) that cover each polygon evenly, and what each counts (k,); see ``triangles.polygons``."""
+        return covering(self.faces, self.polygons)
+
+    @cached_property
     def nearly_coincident(self) -> int:
         """Number of vertices that are grouped with another although rounding separates them in a key."""
         vertices, group = self.welding
@@ -118,7 +155,12 @@ class KeyPair:
 
 
 def consecutive_pairs(
-    shapes: Mapping[str, ArrayLike], faces: ArrayLike, edges: ArrayLike | None, through: Sequence[str]
+    shapes: Mapping[str, ArrayLike],
+    faces: ArrayLike,
+    edges: ArrayLike | None,
+    through: Sequence[str],
+    polygons: ArrayLike | None = None,
+    mirror: Mirror | Sequence[MirrorPlane] = "none",
 ) -> dict[Ends, KeyPair]:
     """The pairs of consecutive keys of a chain, by the names of their ends; a repeated pair is made once.
 
@@ -132,6 +174,11 @@ def consecutive_pairs(
         Edges that belong to no face.
     through : sequence of str
         Names of the keys from the first to the last.
+    polygons : (m,), optional
+        The polygon of each triangle; without it, two triangles that make a flat quad in all keys are one.
+    mirror
+        The planes across which the mesh is mirrored, or how to find them, see ``mirror_planes``: the pairs are then of
+        the mirrored whole.
 
     Raises
     ------
@@ -146,8 +193,27 @@ def consecutive_pairs(
             raise InputError(f"The key {first!r} comes twice in a row; choose different keys one after the other.")
         if (first, second) not in pairs:
             with naming_pair(first, second, through):
-                pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges)
-    return pairs
+                pairs[first, second] = KeyPair.checked(shapes[first], shapes[second], faces, edges, polygons)
+    if polygons is None and len(pairs) > 1:
+        # What is one face must be the same on both sides of a key.
+        every = [pair.key0 for pair in pairs.values()] + [pair.key1 for pair in pairs.values()]
+        quads = flat_quads(every, next(iter(pairs.values())).faces)
+        pairs = {ends: replace(pair, polygons=quads) for ends, pair in pairs.items()}
+    return _mirrored(pairs, mirror)
+
+
+def _mirrored(pairs: dict[Ends, KeyPair], mirror: Mirror | Sequence[MirrorPlane]) -> dict[Ends, KeyPair]:
+    keys = {name: key for ends, pair in pairs.items() for name, key in zip(ends, (pair.key0, pair.key1), strict=True)}
+    half = next(iter(pairs.values()))
+    planes = mirror_planes(mirror, keys, half.faces) if isinstance(mirror, str) else tuple(mirror)
+    if not planes:
+        return pairs
+    whole = Whole(tuple(keys.values()), half.faces, half.edges, half.polygons)
+    for plane in planes:
+        whole = whole.mirrored(plane)
+    shapes = dict(zip(keys, whole.shapes, strict=True))
+    mesh = (whole.faces, whole.edges, whole.polygons, planes)
+    return {(first, second): KeyPair(shapes[first], shapes[second], *mesh) for first, second in pairs}
 
 
 def _lost_far_away(first: Floats, second: Floats) -> InputError | None:
@@ -209,8 +275,8 @@ def require_sizes(pair: KeyPair) -> None:
             )
     if min(sizes) > 0.0 and not 1.0 / _MOST_GROWTH <= sizes[1] / sizes[0] <= _MOST_GROWTH:
         raise InputError(
-            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, more than numbers can hold; "
-            "bring both keys to like sizes, or choose the mode straight."
+            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, too much for "
+            "floating point; bring both keys to similar sizes, or choose the mode straight."
         )
 
 
@@ -218,6 +284,16 @@ def _rounding(key: Floats) -> float:
     """How far apart coincident vertices of a key may be along an axis."""
     steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
     return min(steps, _MOST_ROUNDING * float(np.ptp(key, axis=0).max(initial=0.0)))
+
+
+def _labels(values: ArrayLike, count: int) -> Ints:
+    labels = np.asarray(values)
+    if labels.shape != (count,) or (count and labels.dtype.kind not in "iu"):
+        raise InputError(
+            f"polygons has shape {labels.shape} and holds {labels.dtype} values; it must be a list of {count} whole "
+            "numbers, for each triangle that of its polygon."
+        )
+    return np.ascontiguousarray(labels, dtype=np.int64)
 
 
 def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:

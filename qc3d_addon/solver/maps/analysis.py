@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything that can be told about a mapping, tetrahedron by tetrahedron and in figures."""
+"""Analysis of a map: its representation and distortion on each tetrahedron, at the vertices, and in summary."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PERCENTILES = (1, 50, 99)
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """The distortion of a mapping.
+    """The representation and the distortion of a map; everything is computed when it is first asked for.
 
     Parameters
     ----------
@@ -32,27 +32,27 @@ class Analysis:
 
     @cached_property
     def upper_triangle(self) -> Floats:
-        """(M, 6) the representation as xx, xy, xz, yy, yz, zz of the stretch P; ratios of lengths, no unit."""
+        """(M, 6) the entries xx, xy, xz, yy, yz, zz of the stretch P, without unit: the first six-number form."""
         return upper_triangle(self.mapping.stretch)
 
     @cached_property
     def eigen_form(self) -> Floats:
-        """(M, 6) the representation as eigenvalues a >= b >= c and Euler angles in radians, see ``eigen_form``."""
+        """(M, 6) the eigenvalues a >= b >= c of the stretch and Euler angles in radians: the second six-number form."""
         return eigen_form(self.mapping.stretch)
 
     @cached_property
     def eigenvalues(self) -> Floats:
-        """(M, 3) a >= b >= c: how much lengths grow along the principal directions; c <= 0 where the map is folded."""
+        """(M, 3) principal stretches a >= b >= c; c <= 0 where the map is folded."""
         return singular_values(self.mapping.jacobians)
 
     @cached_property
     def directions(self) -> Floats:
-        """(M, 3, 3) rows: unit vectors of the source along which lengths grow by a, b and c, of either sign."""
+        """(M, 3, 3) principal directions in the source: unit vectors in rows for a, b and c, with arbitrary signs."""
         return np.asarray(np.linalg.eigh(self.mapping.stretch)[1].transpose(0, 2, 1)[:, ::-1])
 
     @cached_property
     def measures(self) -> dict[str, Floats]:
-        """(M,) each: ``dilatation`` K, ``outer_dilatation`` and ``inner_dilatation`` in [1, inf]; ``volume_ratio``."""
+        """(M,) ``dilatation``, ``outer_dilatation``, ``inner_dilatation``, all in [1, inf], and ``volume_ratio``."""
         values = self.eigenvalues
         return {
             "dilatation": dilatation(values),
@@ -62,9 +62,9 @@ class Analysis:
         }
 
     def at_vertices(self) -> dict[str, Floats]:
-        """(N,) means of the measures over the tetrahedra around each vertex, in logarithms, weighted by volume.
+        """(N,) volume-weighted geometric mean of each measure over the tetrahedra around each vertex.
 
-        Tetrahedra that are folded have no logarithm and are left out; NaN where there are no others.
+        Folded tetrahedra are left out; NaN where there are no others.
         """
         mesh = self.mapping.mesh
         good = self.measures["volume_ratio"] > 0.0
@@ -79,7 +79,7 @@ class Analysis:
         return means
 
     def summary(self) -> dict[str, Any]:
-        """Plain values: sizes, folds, and for each measure its extremes, percentiles and mean, weighted by volume."""
+        """Sizes, folds, and volume-weighted extremes, percentiles and mean of each measure, as values for JSON."""
         mesh = self.mapping.mesh
         share = mesh.volumes / mesh.volumes.sum()
         eigenvalues = dict(zip("abc", self.eigenvalues.T, strict=True))
@@ -96,7 +96,7 @@ class Analysis:
 
 
 def _statistics(values: Floats, share: Floats) -> dict[str, float | None]:
-    """Extremes, percentiles and mean by share of the volume; None stands for infinity, which JSON does not have."""
+    """Extremes, percentiles and mean, weighted by ``share`` of the volume (M,); None stands for infinity."""
     order = np.argsort(values)
     reached = np.cumsum(share[order])
     found = {"smallest": values[order[0]]}

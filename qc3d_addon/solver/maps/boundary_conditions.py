@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a map is given when it is rebuilt: boundary conditions and landmarks, each coordinate by itself."""
+"""Boundary conditions and landmarks for the reconstruction of a map, separately for each coordinate."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats
 from ..errors import InputError, ReconstructionError
 from ..tets.mesh import TetMesh
 
 _COORDINATES = "xyz"
+_SAME = 1e-9  # of the map's size: what tables of ten digits leave
 
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Which coordinates of the map are given, and what they are.
+    """Dirichlet conditions of a map: which coordinates are prescribed at which vertices, and their values.
 
     Parameters
     ----------
     held : (N, 3) bool
-        Whether a coordinate of a vertex's image is given.
+        Whether each coordinate of each vertex's image is prescribed.
     values : (N, 3)
-        The given ones; the others are not looked at.
+        The prescribed values; other entries are ignored.
     """
 
     held: Bools
@@ -35,12 +34,14 @@ class Conditions:
 
     @classmethod
     def none(cls, mesh: TetMesh) -> Conditions:
-        """Nothing is given yet."""
+        """No conditions yet."""
         return cls(np.zeros(mesh.points.shape, dtype=bool), np.array(mesh.points))
 
     @classmethod
     def sliding_cube(cls, mesh: TetMesh) -> Conditions:
-        """Every face of the unit cube slides within itself: u is given on x = 0 and 1, v on y, w on z (section 3.3).
+        """Every face of the unit cube slides within itself: u is fixed on x = 0 and 1, v on y, w on z.
+
+        Chen & Lui, section 5.2.
 
         Raises
         ------
@@ -56,25 +57,26 @@ class Conditions:
 
     @classmethod
     def fixed_boundary(cls, mesh: TetMesh, values: Floats) -> Conditions:
-        """All three coordinates are given at every vertex of the boundary, as in ``values`` (N, 3)."""
+        """All coordinates of all boundary vertices are fixed at ``values`` (N, 3)."""
         held = np.zeros(mesh.points.shape, dtype=bool)
         held[np.unique(mesh.boundary_faces)] = True
         return cls(held, np.array(values))
 
     def with_landmarks(self, vertices: ArrayLike, values: ArrayLike) -> Conditions:
-        """These conditions and landmarks, which count where both give a coordinate.
+        """These conditions together with landmarks.
 
         Parameters
         ----------
-        vertices : (k,)
-            Numbers of the landmarks' vertices, from 0.
+        vertices : (k,) int
+            Vertex indices of the landmarks, from 0.
         values : (k, 3)
-            Their images; NaN leaves a coordinate as it is without the landmark.
+            Their images; NaN leaves a coordinate without a landmark.
 
         Raises
         ------
         InputError
-            If a landmark is no vertex or comes twice, or the arrays do not belong together.
+            If an index is out of range or repeated, a landmark contradicts a coordinate that is prescribed already, or
+            the shapes disagree.
         """
         rows, wanted = np.asarray(vertices), np.asarray(values, dtype=np.float64)
         if rows.ndim != 1 or rows.dtype.kind not in "iu" or wanted.shape != (len(rows), 3):
@@ -87,16 +89,32 @@ class Conditions:
             raise InputError("A vertex is a landmark twice; name each once.")
         held, merged = np.array(self.held), np.array(self.values)
         given = np.isfinite(wanted)
+        there = given & self.held[rows]
+        size = float(np.ptp(self.values, axis=0).max()) if there.any() else 0.0
+        apart = np.where(there, np.abs(wanted - self.values[rows]), 0.0)
+        wrong, axes = np.nonzero(apart > _SAME * size)
+        if len(wrong):
+            vertex, axis = rows[wrong[0]], axes[0]
+            raise InputError(
+                f"The landmark at vertex {vertex} wants {_COORDINATES[axis]} at {wanted[wrong[0], axis]:.6g}, where "
+                f"the boundary holds it at {self.values[vertex, axis]:.6g}; leave that coordinate out, or free the "
+                "boundary."
+            )
+        given &= ~there
         held[rows] |= given
         merged[rows] = np.where(given, wanted, merged[rows])
         return Conditions(held, merged)
 
     def require_enough(self, mesh: TetMesh) -> None:
-        """Raise ReconstructionError unless every connected part of the mesh is held so that it cannot become flat.
+        """Check that the conditions determine a map that is not flat on every connected part of the mesh.
 
-        A coordinate that is given nowhere has no solution; one that is given a single value everywhere is constant.
+        Raises
+        ------
+        ReconstructionError
+            If a coordinate is prescribed nowhere on a part, so that it has no unique solution, or has only a single
+            prescribed value there, so that it would be constant.
         """
-        part, count = _parts(mesh)
+        part, count = mesh.parts
         for coordinate, name in enumerate(_COORDINATES):
             held = self.held[:, coordinate] & (part >= 0)
             given, owners = self.values[held, coordinate], part[held]
@@ -114,16 +132,3 @@ class Conditions:
                     f"The coordinate {name} of the map has one value wherever it is held, which makes the map flat; "
                     "hold it at two values or more."
                 )
-
-
-def _parts(mesh: TetMesh) -> tuple[Ints, int]:
-    """The connected part of each vertex, -1 for vertices of no tetrahedron, and the number of parts."""
-    count = len(mesh.points)
-    rows, columns = np.repeat(mesh.tets[:, 0], 3), mesh.tets[:, 1:].ravel()
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    _, labels = connected_components(graph, directed=False)
-    used = np.zeros(count, dtype=bool)
-    used[mesh.tets] = True
-    part = np.full(count, -1, dtype=np.int64)
-    known, part[used] = np.unique(labels[used], return_inverse=True)
-    return part, len(known)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much a map distorts: measures of its Jacobians, and of triangles between two shapes.
+"""Distortion: measures of a map's Jacobians, and of triangles between two shapes.
 
-With the singular values a >= b >= c of a Jacobian (Chen & Lui, section 3.1): the volume ratio abc, the dilatation a/c,
-the outer dilatation a^3 / (abc) and the inner dilatation (abc) / c^3 (Vaisala 1971, *Lectures on n-dimensional
-quasiconformal mappings*, section 14). All are 1 where the map is a rotation; dilatations are 1 for every similarity.
+From the singular values a >= b >= c of a Jacobian (Chen & Lui, section 5.1): the volume ratio abc, the dilatation a/c,
+the outer dilatation a³ / (abc) and the inner dilatation (abc) / c³ (Väisälä 1971, *Lectures on n-dimensional
+quasiconformal mappings*, section 14). All are 1 for a rotation; the dilatations are 1 for any similarity.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..numerics.assembly import gradient_operator
 from ..numerics.rotations import determinants
 from ..triangles.geometry import areas, cross_product, hat_gradients, tangent_bases
 
-# Triangles whose area is below this part of their squared edges have no directions in floating point.
+# Of the squared edges: a triangle with a smaller area has no usable directions in floating point.
 _FLAT = 1e-14
 
 
@@ -28,9 +28,10 @@ def singular_values(jacobians: Floats) -> Floats:
 
 
 def approximate_singular_values(jacobians: Floats) -> Floats:
-    """The same to about 1e-8 of the largest, several times faster: eigenvalues of J^T J in closed form.
+    """As ``singular_values``, to about 1e-8 of the largest, but several times faster.
 
-    After Smith (1961), "Eigenvalues of a symmetric 3 x 3 matrix". The smallest follows from the determinant.
+    The eigenvalues of JᵀJ in closed form (Smith 1961, "Eigenvalues of a symmetric 3 x 3 matrix"); the smallest follows
+    from the determinant.
     """
     metric = jacobians.transpose(0, 2, 1) @ jacobians
     mean = np.einsum("kii->k", metric) / 3.0
@@ -46,34 +47,34 @@ def approximate_singular_values(jacobians: Floats) -> Floats:
 
 
 def volume_ratio(values: Floats) -> Floats:
-    """(m,) abc of singular values (m, 3): volume after the map over volume before; zero or less at folds."""
+    """(m,) abc for singular values (m, 3): volume after the map over volume before; zero or negative at folds."""
     return np.asarray(values.prod(axis=1))
 
 
 def dilatation(values: Floats) -> Floats:
-    """(m,) K = a/c of singular values (m, 3): 1 or more, infinite at folds."""
+    """(m,) K = a/c for singular values (m, 3): at least 1, infinite at folds."""
     return _over(values[:, 0], values[:, 2])
 
 
 def outer_dilatation(values: Floats) -> Floats:
-    """(m,) K_O = a^2 / (bc) of singular values (m, 3): 1 or more, infinite at folds; K <= K_O <= K^2."""
+    """(m,) K_O = a² / (bc) for singular values (m, 3): at least 1, infinite at folds; K <= K_O <= K²."""
     return _over(values[:, 0] ** 2, values[:, 1] * values[:, 2])
 
 
 def inner_dilatation(values: Floats) -> Floats:
-    """(m,) K_I = ab / c^2 of singular values (m, 3): 1 or more, infinite at folds; K <= K_I <= K^2."""
+    """(m,) K_I = ab / c² for singular values (m, 3): at least 1, infinite at folds; K <= K_I <= K²."""
     return _over(values[:, 0] * values[:, 1], values[:, 2] * np.abs(values[:, 2]))
 
 
 class TriangleStretches:
-    """Length ratios of triangles against one shape, whose own measures are taken once.
+    """Principal stretches of triangles relative to a rest shape, which is processed once.
 
     Parameters
     ----------
     rest : (n, 3)
-        The shape that others are measured against.
-    faces : (m, 3)
-        The triangles; those without an area in ``rest`` have the ratio NaN.
+        The shape that other shapes are compared with.
+    faces : (m, 3) int64
+        Triangles; the ratios of those without an area in ``rest`` are NaN.
     """
 
     def __init__(self, rest: Floats, faces: Ints) -> None:
@@ -85,11 +86,12 @@ class TriangleStretches:
     def of(self, shape: Floats) -> Floats:
         """(m, 2) largest and smallest length ratio of each triangle from the rest shape to ``shape`` (n, 3)."""
         first, second = np.stack([self._gradient @ row for row in shape.T]).reshape(3, 2, -1).transpose(1, 0, 2)
-        # In the basis of the first image and what is across it, the images are (length, 0) and (along, across).
+        # In the basis of the first image and the direction perpendicular to it, the two images are (length, 0) and
+        # (along, across).
         length = np.maximum(np.sqrt((first**2).sum(axis=0)), 1e-300)
         along = (first * second).sum(axis=0) / length
         across = np.sqrt((cross_product(first, second) ** 2).sum(axis=0)) / length
-        # Singular values in closed form: the parts of a 2 x 2 matrix that turn and that reflect.
+        # Singular values of a 2 x 2 matrix in closed form, from its rotation part and its reflection part.
         turning, reflecting = np.hypot(length + across, along), np.hypot(length - across, along)
         ratios = np.full((len(self._usable), 2), np.nan)
         ratios[self._usable] = 0.5 * np.stack([turning + reflecting, np.abs(turning - reflecting)], axis=1)
@@ -97,13 +99,13 @@ class TriangleStretches:
 
 
 def extreme_stretch(ratios: Floats) -> Floats:
-    """(m,) of largest and smallest length ratios (m, 2) the one that is farther from 1, measured in logarithms."""
+    """(m,) of each pair of largest and smallest length ratio (m, 2), the one farther from 1 on a logarithmic scale."""
     largest, smallest = ratios.T
     with np.errstate(divide="ignore"):
         return np.asarray(np.where(np.log(largest) >= -np.log(smallest), largest, smallest))
 
 
 def _over(numerator: Floats, denominator: Floats) -> Floats:
-    """The quotient, infinite where the denominator is not positive."""
+    """The quotient; infinite where the denominator is not positive."""
     regular = denominator > 0.0
     return np.where(regular, numerator / np.where(regular, denominator, 1.0), np.inf)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A piecewise linear map of a tetrahedral mesh, of the cube or of any other domain."""
+"""Piecewise linear maps of tetrahedral meshes, of the cube or of any other domain."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..numerics.rotations import determinants
 from ..tets.mesh import TetMesh, edge_matrices
 from .representation import polar_decomposition
 
-# Tetrahedra whose volume is below this part of their longest edge cubed are flat as far as rounding can tell.
+# Of the longest edge cubed: a tetrahedron with a smaller volume is flat up to rounding.
 _FLAT = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Mapping:
-    """Where a map sends the vertices of a tetrahedral mesh.
+    """A piecewise linear map, given by the images of the vertices of a tetrahedral mesh.
 
     Parameters
     ----------
@@ -38,19 +38,19 @@ class Mapping:
 
     @classmethod
     def checked(cls, points: ArrayLike, tets: ArrayLike, values: ArrayLike) -> Mapping:
-        """A mapping from arrays of unknown origin.
+        """Validate arrays of any origin and make a map of them.
 
         Parameters
         ----------
         points, values : (N, 3)
-            Vertices and their images, any unit.
-        tets : (M, 4)
-            Corners of the tetrahedra, in either orientation.
+            Vertices and their images, in any unit.
+        tets : (M, 4) int
+            Vertex indices of the tetrahedra, in either orientation.
 
         Raises
         ------
         InputError
-            If the arrays do not belong together, hold numbers that are none, or a tetrahedron is flat.
+            If shapes disagree, a coordinate is not finite, an index is out of range, or a tetrahedron is flat.
         """
         mesh = checked_mesh(points, tets)
         images = _coordinates(values, "images of the vertices")
@@ -60,34 +60,34 @@ class Mapping:
 
     @cached_property
     def jacobians(self) -> Floats:
-        """(M, 3, 3) Jacobians of the map, one for each tetrahedron."""
+        """(M, 3, 3) Jacobian of the map on each tetrahedron."""
         return self.mesh.jacobians(self.values)
 
     @cached_property
     def stretch(self) -> Floats:
-        """(M, 3, 3) symmetric stretches P of J = R P, the map's representation (Chen & Lui, section 3.1)."""
+        """(M, 3, 3) symmetric stretches P in J = R P: the map's representation (Chen & Lui, section 5.1)."""
         return polar_decomposition(self.jacobians).stretch
 
     @property
     def folds(self) -> int:
-        """Number of tetrahedra that the map turns inside out or makes flat."""
+        """Number of tetrahedra that the map inverts or flattens."""
         return int((determinants(self.jacobians) <= 0.0).sum())
 
 
 def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
-    """A mesh from arrays of unknown origin, every tetrahedron turned to positive orientation.
+    """Validate arrays of any origin and make a mesh of them in which every tetrahedron is positively oriented.
 
     Parameters
     ----------
     points : (N, 3)
-        Vertices, any unit.
-    tets : (M, 4)
-        Corners of the tetrahedra.
+        Vertices, in any unit.
+    tets : (M, 4) int
+        Vertex indices of the tetrahedra, in either orientation.
 
     Raises
     ------
     InputError
-        If the arrays do not belong together, hold numbers that are none, or a tetrahedron is flat.
+        If shapes disagree, a coordinate is not finite, an index is out of range, or a tetrahedron is flat.
     """
     vertices = _coordinates(points, "vertices")
     corners = np.asarray(tets)

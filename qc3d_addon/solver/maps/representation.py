@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D quasiconformal representation of a map: the symmetric stretch of its Jacobian on every tetrahedron.
+"""The 3D quasiconformal representation of a map: the symmetric stretch of its Jacobian on each tetrahedron.
 
-Chen & Lui, "A Novel 3D Mapping Representation and its Applications", section 3: J = R P with P symmetric positive
-definite. P has six numbers per tetrahedron, written either as its upper triangle or as three eigenvalues and the
-Euler angles of its eigenvectors.
+J = R P with P symmetric positive definite (Chen & Lui, "A Novel 3D Mapping Representation and its Applications",
+section 5.1). P has six numbers for each tetrahedron: its upper triangle, or its three eigenvalues and the Euler angles
+of its eigenvectors.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ _ROWS, _COLUMNS = np.triu_indices(3)
 
 
 class Polar(NamedTuple):
-    """J = rotation @ stretch, per element: two (M, 3, 3) arrays."""
+    """The factors of J = rotation @ stretch: two (M, 3, 3) arrays."""
 
     rotation: Floats
     stretch: Floats
 
 
 def polar_decomposition(jacobians: Floats) -> Polar:
-    """Split Jacobians (M, 3, 3) into a rotation and a symmetric stretch.
+    """Polar decomposition of Jacobians (M, 3, 3) into a rotation and a symmetric stretch.
 
-    Where det J > 0 the stretch is positive definite; where an element is folded its smallest eigenvalue is negative.
+    If det J > 0, the stretch is positive definite; on a folded element, its smallest eigenvalue is negative.
     """
     rotation = closest_rotations(jacobians)
     stretch = rotation.transpose(0, 2, 1) @ jacobians
@@ -52,17 +52,17 @@ def from_upper_triangle(numbers: Floats) -> Floats:
 
 
 def eigen_form(stretch: Floats) -> Floats:
-    """(M, 6): eigenvalues a >= b >= c and Euler angles of the eigenvectors: the second six-number form.
+    """(M, 6) eigenvalues a >= b >= c and Euler angles of the eigenvectors: the second six-number form.
 
-    P = W diag(a, b, c) W^T with W = Rz(alpha) Ry(beta) Rx(gamma) a rotation, angles in radians, alpha and gamma in
-    [-pi, pi], beta in [-pi/2, pi/2]. Where W has determinant -1 its last column is flipped, which leaves P as it is.
+    P = W diag(a, b, c) Wᵀ with the rotation W = Rz(alpha) Ry(beta) Rx(gamma). Angles are in radians, alpha and gamma in
+    [-pi, pi], beta in [-pi/2, pi/2]. If det W = -1, its last column is negated, which does not change P.
     """
     values, vectors = np.linalg.eigh(stretch)
     values, vectors = values[:, ::-1], vectors[:, :, ::-1].copy()
     vectors[:, :, 2] *= np.sign(np.linalg.det(vectors))[:, None]
     alpha = np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])
     beta = np.arctan2(-vectors[:, 2, 0], np.hypot(vectors[:, 0, 0], vectors[:, 1, 0]))
-    # Gamma is read off Rz(-alpha) W: near beta = +-pi/2 alpha is arbitrary, and gamma makes up for whatever it is.
+    # Gamma comes from Rz(-alpha) W: near beta = +-pi/2 (gimbal lock) alpha is arbitrary, and gamma compensates for it.
     sine, cosine = np.sin(alpha), np.cos(alpha)
     gamma = np.arctan2(
         sine * vectors[:, 0, 2] - cosine * vectors[:, 1, 2], cosine * vectors[:, 1, 1] - sine * vectors[:, 0, 1]
@@ -83,20 +83,20 @@ def from_eigen_form(numbers: Floats) -> Floats:
 
 
 def conductivity(stretch: Floats) -> Floats:
-    """(M, 3, 3) matrices A = det(P) P^-2 of the generalised Laplace equation (Chen & Lui, section 3.2).
+    """(M, 3, 3) matrices A = det(P) P⁻² of the generalized Laplace equation (Chen & Lui, section 5.2).
 
-    Since P^-1 = cof(P) / det(P) for a symmetric P, A = cof(P)^2 / det(P).
+    Since P⁻¹ = cof(P) / det(P) for a symmetric P, A = cof(P)² / det(P).
 
     Raises
     ------
     ReconstructionError
-        If a stretch is not positive definite: such an element is folded or collapsed.
+        If a stretch (M, 3, 3) is not positive definite, which means that the element is folded or collapsed.
     """
     determinant = determinants(stretch)
     trace = np.einsum("kii->k", stretch)
     cofactor = cofactors(stretch)
     minors = np.einsum("kii->k", cofactor)
-    # The three invariants of a symmetric matrix are all positive exactly if its eigenvalues are.
+    # A symmetric matrix is positive definite exactly if its three invariants are positive.
     bad = np.flatnonzero(~((determinant > 0.0) & (trace > 0.0) & (minors > 0.0)))
     if bad.size:
         raise ReconstructionError(

@@ -63,7 +63,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions) -> FilledCube:
     """
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
-    resolution = RESOLUTIONS[options.quality]
+    resolution = RESOLUTIONS[options.quality].beside(points, faces)
     notes: list[str] = []
     if options.engine != "delaunay":
         try:

@@ -10,7 +10,7 @@ here, the radius of the disk itself grows linearly with that distance, and nothi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -19,12 +19,16 @@ from scipy.spatial import cKDTree
 from ..arrays import Bools, Floats, Ints
 from ..settings import Quality
 from ..triangles.geometry import areas
-from ..triangles.topology import without_piles
+from ..triangles.topology import sides, without_piles
 
 SizeField = Callable[[Floats], Floats]
 
 _OVERSAMPLING = 4.0  # candidates per disk: enough to leave few gaps between the disks
 _NEIGHBOURS = 16  # at this oversampling, few candidates have more neighbors inside their disk
+# What is thin has short edges across it, where they are this percentile of all.
+_SHORT_PERCENTILE = 2.0
+_SAMPLES_OF_AN_EDGE = 0.25  # the part of an edge between two samples
+_COARSEST = 2.0
 _MOST_CANDIDATES = 500_000  # of a surface: where it is folded more densely, further ones would be rejected anyway
 
 
@@ -43,6 +47,15 @@ class Resolution:
     spacing: float
     slope: float
     largest: float
+
+    def beside(self, points: Floats, faces: Ints) -> Resolution:
+        """Coarser, up to twice, at a surface whose edges are all long: a box needs no fine samples on its sides."""
+        edges = sides(faces)
+        if not len(edges):
+            return self
+        lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+        short = float(np.percentile(lengths, _SHORT_PERCENTILE))
+        return replace(self, spacing=min(max(self.spacing, _SAMPLES_OF_AN_EDGE * short), _COARSEST * self.spacing))
 
     def around(self, surface: Floats) -> SizeField:
         """Distance between samples as a function of position, around a surface given by samples (k, 3)."""

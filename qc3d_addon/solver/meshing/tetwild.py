@@ -137,7 +137,7 @@ def _require_success(ending: Ending, output: Path, time_limit: float) -> None:
     if ending.status is None:
         raise MeshingError(
             f"The meshing engine tetwild was stopped after its time limit of {time_limit:g} s; "
-            "allow it more, or choose a lower quality or the engine delaunay."
+            "raise the limit, or choose a lower quality or the engine delaunay."
         )
     if ending.status != 0 or not output.exists():
         how = f" with an error: {ending.words}." if ending.words else f" without a mesh (exit status {ending.status})."

@@ -105,7 +105,8 @@ def consistent_turning(
     if rest is not None and rest.any():
         resting = np.broadcast_to(rest, turns.shape)
         angles = np.where(loose, angles, _relative_angles(turns, resting))
-        started = np.where(loose[:, None], turns, nearest_branch(turns, resting))
+        rests = ~loose & (angles < 0.5 * np.pi)
+        started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
     forest = forest.rooted(angles)
     vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]

@@ -17,6 +17,8 @@ _BYTES_PER_POSITION = 110.0  # for each vertex in each frame: positions, measure
 _MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only counts crossings
 _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress
 _KB_PER_FRAME, _BYTES_PER_COMPRESSED = 5.0, 220.0
+_BYTES_OF_FACTORS = 600.0  # for each vertex to the power 4/3, as for the factors of a three-dimensional mesh
+_KB_OF_MATRICES, _BLOCKS = 1.0, 6  # for each vertex; blocks of vectors and directions that are held at once
 _SHARE_OF_MACHINE = 0.75  # leaves a quarter for Blender and the system
 
 
@@ -58,8 +60,8 @@ def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
     if needed_mb > limit_mb:
         raise InputError(
             f"The bake of {vertices} vertices needs about {needed_mb:.0f} MB of memory, and its limit is "
-            f"{limit_mb:.0f} MB. Allow it more, take fewer in-betweens or keys, or bake a coarser mesh and carry the "
-            "in-betweens over with a Surface Deform modifier."
+            f"{limit_mb:.0f} MB. Raise the limit, use fewer in-betweens or keys, or bake a coarser mesh and transfer "
+            "the in-betweens with a Surface Deform modifier."
         )
 
 
@@ -73,6 +75,28 @@ def require_memory_for_tets(points: int, tets: int, held: int) -> None:
     """
     needed = _MB_OF_A_COMMAND + max(points, tets) * _KB_PER_TET / 1e3 + 2.0 * held / 1e6
     _require(needed, f"A mesh of {tets} tetrahedra and {points} vertices", "use a coarser mesh")
+
+
+def require_memory_for_modes(vertices: int, modes: int, block: int) -> None:
+    """Check that the modes of a mesh can be computed, before that begins.
+
+    Parameters
+    ----------
+    vertices, modes
+        Of the mesh, and how many are asked for.
+    block
+        Vectors that are worked on at once; 0 where the matrix is factored.
+
+    Raises
+    ------
+    InputError
+        If they are too many for this machine.
+    """
+    vectors = 2 * modes if block == 0 else modes + 2 * block * _BLOCKS
+    needed = _MB_OF_A_COMMAND + vertices * (_KB_OF_MATRICES / 1e3 + 8.0 * vectors / 1e6)
+    if block == 0:
+        needed += _BYTES_OF_FACTORS * vertices ** (4 / 3) / 1e6
+    _require(needed, f"Computing {modes} modes of {vertices} vertices", "use fewer modes or a coarser mesh")
 
 
 def require_memory_for_frames(frames: int, vertices: int) -> None:

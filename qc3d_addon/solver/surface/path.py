@@ -30,11 +30,14 @@ from .end_rates import (
     strain_of_slope,
     stretch_slopes,
 )
+from .lengths_first import SMALL_CORRECTION, LengthsFirst
 from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
 from .tangents import tangents_of
 
 ANCHOR_WEIGHT = 5e-5
+# What travels a hundredth of the size or more is not drawn to its line at all.
+_NO_LINE = (NEARLY_STILL / 1e-2) ** 2
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -80,7 +83,9 @@ class SurfacePath:
         still = embedding.still[self.vertices]
         count = len(self.vertices)
         faces = self._group[embedding.pair.faces]
-        self.deformation = TriangleDeformation.between(self._key0, key1, faces)
+        triangles, shares = embedding.pair.covering
+        triangles = self._group[triangles]
+        self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
@@ -93,23 +98,31 @@ class SurfacePath:
             still &= ~returned
         self.still = still[self._group]
         self._free = ~still
-        self._springs = _edges_without_triangle(faces, self._group[embedding.pair.edges], self.deformation.faces)
+        self._springs = edges_without_triangle(triangles, self._group[embedding.pair.edges], self.deformation.faces)
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self.components = labels[self._group]
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
+        edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
+        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
         # What hardly travels is drawn to its straight line, in the limit as if it were still.
         travel = np.maximum(embedding.travel[self.vertices], STILL_TOLERANCE)
-        self._line_weights = np.where(returned, 0.0, (NEARLY_STILL / travel) ** 4)
+        self._line_weights = np.where(returned, 0.0, np.maximum((NEARLY_STILL / travel) ** 2 - _NO_LINE, 0.0) ** 2)
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
-            usable, self._springs, self._closed, self._free, self._key0, self._anchor_weights + self._line_weights
+            usable,
+            self._springs,
+            self._closed,
+            (triangles, shares),
+            self._free,
+            self._key0,
+            self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
         self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
@@ -170,7 +183,14 @@ class SurfacePath:
 
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
         """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
-        settled = Sweeps(self._surface, [self._wanted(*moment) for moment in moments]).settled(sweeps)
+        wanted = [self._wanted(*moment) for moment in moments]
+        work = Sweeps(self._surface, wanted)
+        settled = work.settled(sweeps)
+        costly = np.flatnonzero(work.corrected > SMALL_CORRECTION).tolist()
+        if costly:
+            free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
+            for shape, other in zip(costly, free, strict=True):
+                settled[shape] = self._lengths_first.mixed(settled[shape], other)
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
@@ -203,7 +223,7 @@ def _spans(positions: Floats, edges: Ints) -> Floats:
     return np.asarray(positions[edges[:, 1]] - positions[edges[:, 0]])
 
 
-def _edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
+def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
     """(k, 2) edges that no usable triangle holds together: wires and edges of triangles without an area."""
     every = unique_edges(np.concatenate([sides(faces), wires]))
     held = unique_edges(sides(usable))

@@ -96,10 +96,19 @@ class Sweeps:
         The factored system.
     wanted : sequence of Wanted
         One for each shape.
+    holds_volumes : bool
+        Whether closed components get the volumes that are wanted.
+
+    Attributes
+    ----------
+    corrected : (q,)
+        For each shape the largest part of a wanted volume that is missing half-way, before volumes are looked at.
     """
 
-    def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted]) -> None:
+    def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted], holds_volumes: bool = True) -> None:
         self._surface = surface
+        self._holds_volumes = holds_volumes and not surface.volumes.empty
+        self.corrected = np.zeros(len(wanted))
         self._wanted = wanted
         self._moving = slice(0, len(surface.moving))
         # The moving vertices first, then the still ones next to them.
@@ -126,7 +135,8 @@ class Sweeps:
         for sweep in range(1, sweeps):
             present, refitted = self._moved.copy(), self._refitted()
             # Volumes are restored in the second half only: doing it earlier improves no measure.
-            if 2 * sweep > sweeps:
+            if 2 * sweep > sweeps and self._holds_volumes:
+                self._note_missing()
                 refitted = self._with_volumes(refitted)
             # Acceleration would only amplify the rounding of a shape that has converged.
             going &= np.abs(refitted - present).max(axis=(0, 2)) > _SETTLED
@@ -134,6 +144,7 @@ class Sweeps:
                 break
             following = iteration.next(present, refitted)
             self._move(following if going.all() else np.where(going[:, None], following, present))
+        self._note_missing()
         self._move(self._corrected(False))
         self._restore_volumes()
 
@@ -212,10 +223,8 @@ class Sweeps:
     def _with_volumes(self, moved: Floats) -> Floats:
         """(3, q, k) positions ``moved``, corrected so that every closed component has its volume to first order."""
         volumes = self._surface.volumes
-        if volumes.empty:
-            return moved
         found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-        direction = self._direction(np.stack([slope for _, slope in found], axis=1))
+        direction = self._direction()
         present, result = self._moved, np.empty_like(moved)
         for shape, (enclosed, slope) in enumerate(found):
             missing = self._missing_volumes[shape] - enclosed
@@ -224,10 +233,21 @@ class Sweeps:
             result[:, shape] = volumes.stepped(moved[:, shape], direction[:, shape], slope, missing)
         return result
 
-    def _direction(self, slopes: Floats) -> Floats:
+    def _note_missing(self) -> None:
+        """Keep what volumes miss where they are looked at for the first time."""
+        if not self._holds_volumes or self.corrected.any():
+            return
+        shapes = self._positions.transpose(1, 0, 2)
+        found = np.stack([self._surface.volumes.with_slope(shape)[0] for shape in shapes])
+        wanted = np.abs(np.stack([shape.volumes for shape in self._wanted]))
+        missing = np.abs(np.stack(self._missing_volumes) - found)
+        self.corrected = (missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0)
+
+    def _direction(self) -> Floats:
         """(3, q, k) K⁻¹ ∇V, computed at the first call only: shapes change too little afterward to matter."""
         if self._volume_direction is None:
-            self._volume_direction = self._surface.solve(slopes)
+            even = [self._surface.volumes.even_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
+            self._volume_direction = self._surface.solve(np.stack(even, axis=1))
         return self._volume_direction
 
     def _limited(self, missing: Floats, shape: int) -> Floats:
@@ -238,11 +258,11 @@ class Sweeps:
     def _restore_volumes(self) -> None:
         """Steps along K⁻¹ ∇V until every closed component of every shape has its volume, up to rounding."""
         volumes = self._surface.volumes
-        if volumes.empty:
+        if not self._holds_volumes:
             return
         for _ in range(_LAST_VOLUME_STEPS):
             found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-            direction = self._direction(np.stack([slope for _, slope in found], axis=1))
+            direction = self._direction()
             restored = True
             for shape, (enclosed, slope) in enumerate(found):
                 missing = self._missing_volumes[shape] - enclosed

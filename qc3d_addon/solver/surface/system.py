@@ -36,6 +36,8 @@ class MovingSurface:
         Edges that keep their interpolated length.
     closed : ClosedComponents
         Components whose volume is kept.
+    covering : tuple of (t, 3) int64 and (t,)
+        Triangles that cover the surface evenly, and what each counts.
     free : (n,) bool
         Whether each vertex moves; the others are still.
     points : (n, 3)
@@ -60,6 +62,7 @@ class MovingSurface:
         deformation: TriangleDeformation,
         springs: Ints,
         closed: ClosedComponents,
+        covering: tuple[Ints, Floats],
         free: Bools,
         points: Floats,
         anchor_weights: Floats,
@@ -77,8 +80,8 @@ class MovingSurface:
         )
         moving = np.flatnonzero(free)
         moving = moving[elimination_order(points[moving], csr_array(stiffness[moving][:, moving]))]
-        touched = closed.faces[free[closed.faces].any(axis=1)]
-        beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), touched.ravel()]))
+        touched = [part[free[part].any(axis=1)].ravel() for part in (closed.faces, covering[0])]
+        beside = distinct(np.concatenate([faces.ravel(), edges.ravel(), *touched]))
         beside = beside[~free[beside]]
         self.moving, self.used = moving, np.concatenate([moving, beside])
         number = np.zeros(count, dtype=np.int64)
@@ -86,7 +89,7 @@ class MovingSurface:
         self.faces = number[faces]
         self._stiffness = csr_array(stiffness[moving][:, moving])
         self.stiffness_beside = csr_array(stiffness[moving][:, beside])
-        self.volumes = MovingVolumes(closed, moving, self.used)
+        self.volumes = MovingVolumes(closed, covering, moving, self.used)
         self.gradient = gradient_operator(self.faces, self.hats, len(self.used))
         ends = np.tile([-1.0, 1.0], len(edges)), number[edges].ravel(), np.arange(0, 2 * len(edges) + 1, 2)
         self.spans = csr_array(ends, shape=(len(edges), len(self.used)))

@@ -23,6 +23,8 @@ class MovingVolumes:
     Parameters
     ----------
     closed : ClosedComponents
+    covering : tuple of (t, 3) int64 and (t,)
+        Triangles that cover the surface evenly, and what each counts, for directions that favor no diagonal of a quad.
     moving : (k,) int64
         The moving vertices.
     used : (l,) int64
@@ -30,7 +32,7 @@ class MovingVolumes:
         one of them.
     """
 
-    def __init__(self, closed: ClosedComponents, moving: Ints, used: Ints) -> None:
+    def __init__(self, closed: ClosedComponents, covering: tuple[Ints, Floats], moving: Ints, used: Ints) -> None:
         count = len(closed.labels)
         moves = np.zeros(count, dtype=bool)
         moves[moving] = True
@@ -52,10 +54,11 @@ class MovingVolumes:
         self._views[labels] = corners[first]
         # The three corners of each triangle and the apex of its cone.
         self._looked_at = np.concatenate([self._corners, number[self._views[self._label_of_face]][None]])
-        flat = self._corners.ravel()
-        free = np.flatnonzero(flat < len(moving))
-        entries = (flat[free], free % max(1, self._corners.shape[1]))
-        self._incidence = csr_array((np.ones(len(free)), entries), shape=(len(moving), self._corners.shape[1]))
+        self._incidence = _incidence(self._corners, len(moving))
+        triangles, shares = covering
+        touched = closed.among(triangles) & moves[triangles].any(axis=1)
+        self._even_corners: Ints = np.ascontiguousarray(number[triangles[touched]].T)
+        self._even_incidence = _incidence(self._even_corners, len(moving), shares[touched])
 
     @property
     def empty(self) -> bool:
@@ -89,6 +92,12 @@ class MovingVolumes:
         volumes = sums_by_label(self._label_of_face, shares, self._components) / 6.0
         return volumes, np.stack([self._incidence @ normal for normal in normals]) / 6.0
 
+    def even_slope(self, positions: Floats) -> Floats:
+        """(3, k) how volumes change with what moves, polygons taken as the mean of all ways to triangulate them."""
+        first, second, third = (positions[:, corners] for corners in self._even_corners)
+        normals = cross_product(second - first, third - first)
+        return np.asarray(np.stack([self._even_incidence @ normal for normal in normals]) / 6.0)
+
     def changes(self, slope: Floats, moves: Floats) -> Floats:
         """(components,) first-order change of the volumes if the moving vertices are displaced by ``moves`` (3, k)."""
         return sums_by_label(self._label_of_vertex, (slope * moves).sum(axis=0), self._components)
@@ -99,3 +108,12 @@ class MovingVolumes:
         grows = gain > 0.0
         length = np.where(grows, missing / np.where(grows, gain, 1.0), 0.0)
         return np.asarray(moved + length[self._label_of_vertex] * direction)
+
+
+def _incidence(corners: Ints, count: int, shares: Floats | None = None) -> csr_array:
+    """(count, m) which of the first vertices are corners (3, m) of which triangles; what each counts, or 1."""
+    flat, triangles = corners.ravel(), corners.shape[1]
+    free = np.flatnonzero(flat < count)
+    column = free % max(1, triangles)
+    values = np.ones(len(free)) if shares is None else shares[column]
+    return csr_array((values, (flat[free], column)), shape=(count, triangles))

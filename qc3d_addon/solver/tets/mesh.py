@@ -104,6 +104,22 @@ class TetMesh:
         shape = (len(self.points), len(self.tets))
         return coo_array((np.ones(len(owners)), (self.tets.ravel(), owners)), shape=shape).tocsr()
 
+    @cached_property
+    def parts(self) -> tuple[Ints, int]:
+        """(N,) the connected part of each vertex, -1 for vertices of no tetrahedron; and how many parts there are."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count = len(self.points)
+        rows, columns = np.repeat(self.tets[:, 0], 3), self.tets[:, 1:].ravel()
+        graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+        _, labels = connected_components(graph, directed=False)
+        used = np.zeros(count, dtype=bool)
+        used[self.tets] = True
+        part = np.full(count, -1, dtype=np.int64)
+        known, part[used] = np.unique(labels[used], return_inverse=True)
+        return part, len(known)
+
     def jacobians(self, values: Floats) -> Floats:
         """(M, 3, 3) Jacobians of the map that sends ``points`` to ``values`` (N, 3); component-major."""
         rows = [self.gradient_operator @ coordinate for coordinate in np.ascontiguousarray(values.T)]

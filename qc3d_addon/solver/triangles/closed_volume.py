@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..numerics.grouped_sums import sums_by_label
 from .topology import closed_faces
 
@@ -30,10 +30,17 @@ class ClosedComponents:
     """
 
     def __init__(self, faces: Ints, labels: Ints) -> None:
-        self.faces = faces[closed_faces(faces, labels)]
+        closed = closed_faces(faces, labels)
+        self.faces = faces[closed]
         self.labels = labels
+        self._is_closed = np.zeros(int(labels.max(initial=-1)) + 1, dtype=bool)
+        self._is_closed[labels[self.faces[:, 0]]] = True
         # Measured from one of its own vertices, a tiny component far from the origin has an accurate volume.
         self._views: Ints = np.unique(labels, return_index=True)[1].astype(np.int64)
+
+    def among(self, triangles: Ints) -> Bools:
+        """(k,) which of other triangles (k, 3) of the same vertices belong to closed components."""
+        return np.asarray(self._is_closed[self.labels[triangles[:, 0]]])
 
     def volumes(self, positions: Floats) -> Floats:
         """(components,) signed enclosed volumes for positions (n, 3), in cubed units; 0 for open components."""

@@ -62,8 +62,13 @@ class TriangleDeformation:
     rows: Ints
 
     @classmethod
-    def between(cls, key0: Floats, key1: Floats, faces: Ints) -> TriangleDeformation:
-        """Deformation of the usable triangles of ``faces`` (m, 3) from ``key0`` (n, 3) to ``key1`` (n, 3)."""
+    def between(
+        cls, key0: Floats, key1: Floats, faces: Ints, shares: Floats | float = 1.0
+    ) -> TriangleDeformation:
+        """Deformation of the usable triangles of ``faces`` (m, 3) from ``key0`` (n, 3) to ``key1`` (n, 3).
+
+        What they count is multiplied by ``shares`` (m,).
+        """
         double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
         usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
         faces = faces[usable]
@@ -74,8 +79,8 @@ class TriangleDeformation:
         stretch = spin.transpose(0, 2, 1) @ planar
         stretch = 0.5 * (stretch + stretch.transpose(0, 2, 1))
         rotations = _lifted(bases1, spin) @ bases0.transpose(0, 2, 1)
-        areas = 0.5 * double0[usable]
-        weights = np.sqrt(areas)
+        areas = 0.5 * (shares * double0)[usable]
+        weights = np.sqrt(np.broadcast_to(shares, usable.shape)[usable] * areas)
         weights *= areas.sum() / max(float(weights.sum()), 1e-300)
         turns = rotation_vectors(rotations)
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))

@@ -117,6 +117,23 @@ def unique_edges(edges: Ints) -> Ints:
     return np.stack([codes // span, codes % span], axis=1)
 
 
+def open_loops(faces: Ints) -> tuple[Ints, Ints]:
+    """The vertices (k,) of boundary edges, which have one triangle, and for each the label of its boundary loop."""
+    edges = sides(faces)
+    low, high = edges.T
+    span = int(high.max(initial=0)) + 1
+    codes = np.sort(low * span + high)
+    alone = np.ones(len(codes), dtype=bool)
+    alike = codes[1:] == codes[:-1]
+    alone[1:] &= ~alike
+    alone[:-1] &= ~alike
+    rim = np.stack([codes[alone] // span, codes[alone] % span], axis=1)
+    rim = rim[rim[:, 0] != rim[:, 1]]
+    corners = distinct(rim.ravel())
+    labels = vertex_components(np.searchsorted(corners, rim), len(corners))
+    return corners, labels
+
+
 def face_adjacency(faces: Ints) -> Ints:
     """(k, 2) pairs of triangles that share an edge; the triangles of a non-manifold edge are linked one to the next."""
     edges = sides(faces)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the file ``files/baked_VERSION.blend`` of the Blender that runs this: every kind of thing that a bake leaves.
+"""Make the file ``files/baked_VERSION.blend`` with the Blender that runs this: everything that a bake can leave in it.
 
     python -m tests.blender.attacks.make_baked_files
 """

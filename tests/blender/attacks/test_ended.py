@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender is killed while it bakes, and the add-on is switched off: no process, no file of its own, nothing written."""
+"""Blender is killed during a bake, or the add-on is disabled: no process or file is left, and nothing is written."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 qc3d_addon.register()
 bpy.context.view_layer.objects.active = bpy.data.objects["Figure"]
 choices = {"count": 400, "quality": "finest", "engine": "delaunay"} if sys.argv[2] == "slow" else {"mode": "straight"}
-print(bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices))
+print(bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices))
 bpy.ops.wm.save_mainfile()
 qc3d_addon.unregister()  # the Python module of Blender 4.5 may crash at its end where classes are registered
 """
@@ -126,7 +126,7 @@ def test_blender_is_ended_while_it_bakes(
 
 def begin(figure: bpy.types.Object) -> int:
     """Start a bake as the button does; the number of the process that does the work."""
-    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 400, FitOptions(quality="finest")))
+    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 400, FitOptions(quality="finest"), play_on="slider"))
     job = jobs.begin("Bake In-Betweens", plan.task, Limits())
     wait_for(lambda: job.poll() or job.stage != "Starting", "the first stage")
     return job._worker._process.pid
@@ -149,7 +149,9 @@ def test_the_addon_is_switched_off_while_it_bakes(
     assert state() == before
     assert not hasattr(bpy.types.Object, "qc3d")
     qc3d_addon.register()
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="straight") == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(
+        play_on="slider", from_key="Basis", to_key="Lean", mode="straight"
+    ) == {"FINISHED"}
 
 
 def test_another_file_is_loaded_while_it_bakes(figure: bpy.types.Object, temporary: Path) -> None:
@@ -163,7 +165,7 @@ def test_another_file_is_loaded_while_it_bakes(figure: bpy.types.Object, tempora
 @pytest.mark.usefixtures("quick_map")
 def test_the_addon_is_switched_off_while_a_file_is_saved(figure: bpy.types.Object, tmp_path: Path) -> None:
     """By a handler of somebody else: the preview, which was put away for saving, does not come back."""
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=1) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=1) == {"FINISHED"}
     assert bpy.ops.qc3d.live_scrub() == {"FINISHED"}
 
     def switch_off(*_: object) -> None:

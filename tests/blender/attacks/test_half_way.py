@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever makes several things is stopped at each of its steps in turn: nothing of it is left, at any of them.
+"""Everything that makes several things is stopped at each of its steps in turn: it never leaves half of them.
 
-A step is the call of a function of the add-on. What ends a change (the removal of replaced keys, once all the new is
-there and remembered) is not stopped: it is Blender's own calls in a row, with nothing in between that could fail.
+A step is the call of one of the add-on's functions. The end of a change is not stopped (the removal of replaced keys,
+once everything new exists and is recorded): it consists of Blender's own calls only, none of which can fail.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ State = Callable[[], dict[str, Any]]
 FOLDER = str(Path(plans.__file__).parents[1])
 ENDINGS = (
     shape_keys.remove_keys,
+    shape_keys._let_play,
     slider.set_keyframes,
     heat_map.hide,
     keyframes._put_in_place,
@@ -109,7 +110,7 @@ def outcome_of(plan: Plan) -> tuple[Plan, Outcome]:
 
 
 def request(to_key: str = "Lean", count: int = 2, **choices: Any) -> BakeRequest:  # noqa: ANN401 - of the request
-    return BakeRequest(("Basis", to_key), count, **choices)
+    return BakeRequest(("Basis", to_key), count, play_on="slider", **choices)
 
 
 @pytest.fixture
@@ -190,7 +191,7 @@ def test_a_mirror_image(baked: bpy.types.Object, state: State) -> None:
     assert stop_everywhere(lambda: mirror.mirror_chain(baked, *chain_of(baked)), state) > 50
     heat_map.show(baked, chain_of(baked)[1], "volume")
     record = Record.read(baked.data.shape_keys)
-    baked.data.shape_keys.key_blocks["Basis→Lean 1/3"].points[0].co.z += 0.25
+    baked.data.shape_keys.key_blocks["Basis_to_Lean_33"].points[0].co.z += 0.25
     assert stop_everywhere(lambda: mirror.mirror_chain(baked, record, record.chains[0]), state) > 50
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a heat map keeps in the file, damaged: the panel draws, the map can be hidden and shown again."""
+"""Damaged heat-map data in a file: the panel draws, and the heat map can be hidden and shown again."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def shown(figure: bpy.types.Object) -> bpy.types.Object:
     """A bake with its heat map, over a colour of the animator's own."""
     figure.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
     choices = {"mode": "linear", "count": 1}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
     assert bpy.ops.qc3d.heat_map() == {"FINISHED"}
     return figure
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters and colliders from libraries that are baked again and reloaded."""
+"""Characters and colliders from linked libraries, re-baked and reloaded."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("quick_map")
 
 Shown = Callable[..., np.ndarray]
 State = Callable[[], dict[str, Any]]
-SLIDER = "Basis→Lean"
+SLIDER = "Basis_to_Lean"
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def library(figure: bpy.types.Object, tmp_path: Path) -> Path:
 
 def bake(count: int) -> None:
     choices = {"count": count, "mode": "linear"}
-    assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
+    assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
 
 
 def linked(path: Path) -> bpy.types.Object:
@@ -106,7 +106,7 @@ def test_an_override_plays_what_its_library_was_baked_to_since(
 def test_baked_to_another_number_the_override_plays_when_it_is_resynced(library: Path, shown: Shown) -> None:
     """Blender overrides the target of each driver by the driver's number; of new ones it knows from then on."""
     made_shot(library, count=3)
-    assert len([key for key in override().data.shape_keys.key_blocks if "→" in key.name]) == 4
+    assert len([key for key in override().data.shape_keys.key_blocks if "_to_" in key.name]) == 4
     assert override().override_library.resync(bpy.context.scene, view_layer=bpy.context.view_layer)
     expect_playing(shown)
 
@@ -147,7 +147,7 @@ def off(figure: bpy.types.Object, tmp_path: Path) -> bpy.types.Collection:
 def test_a_library_of_colliders_is_reloaded_meanwhile(off: bpy.types.Collection, tmp_path: Path, moved: bool) -> None:
     figure = bpy.data.objects["Figure"]
     bpy.context.view_layer.objects.active = figure
-    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 1, colliders="Off"))
+    plan = plan_bake(figure, BakeRequest(("Basis", "Lean"), 1, colliders="Off", play_on="slider"))
     outcome = finish(carry_out(plan.task))
     if moved:
         run_elsewhere(tmp_path / "balls.blend", "bpy.data.objects['Ball'].location.x = 3.0")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files with bakes that Blender 4.5 and 5.2 wrote, each opened in both: all plays, and all can be worked on.
+"""Baked files of Blender 4.5 and 5.2, each opened in both: everything plays and can be edited.
 
 ``make_baked_files.py`` made them.
 """

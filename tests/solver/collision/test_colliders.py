@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames keep off colliders, fixed and moving, and meet their keys all the same."""
+"""Frames stay out of fixed and moving colliders, and meet their keys all the same."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SETTINGS = FitOptions()
 
 
 def bulging(points: Floats) -> Floats:
-    """A unit ball with a bulge of a quarter towards -y, as points (n, 3) of any length on their rays."""
+    """A unit ball with a bulge of a quarter toward -y, as points (n, 3) of any length on their rays."""
     rays = points / np.linalg.norm(points, axis=1, keepdims=True)
     angle = np.degrees(np.arccos(np.clip(-rays[:, 1], -1.0, 1.0)))
     return np.asarray(rays * (1.0 + 0.25 * np.maximum(1.0 - (angle / 30.0) ** 2, 0.0) ** 2)[:, None])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Crossing pairs of triangles against every pair tried in exact arithmetic, touching and coplanar ones included."""
+"""Crossing pairs of triangles against exact arithmetic on all pairs, including touching and coplanar ones."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def test_a_search_that_would_take_too_long_is_given_up() -> None:
     jitter = 1e-3 * np.random.default_rng(2).normal(size=(3 * copies, 3))
     crowded = np.concatenate([points, np.tile(points[faces[0]], (copies, 1)) + jitter])
     together = np.concatenate([faces, len(points) + triangles(copies)])
-    with pytest.raises(CrowdedError, match="looking for crossings would take too long"):
+    with pytest.raises(CrowdedError, match="searching for crossings would take too long"):
         crossing_pairs(crowded, together)
     limit = CrossingLimit(together, crowded, 1.1 * crowded, np.zeros(len(crowded), dtype=bool))
     assert limit.excess(crowded) is None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Signed distances from meshes whose distances are known."""
+"""Signed distances from meshes for which they are known."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps compressed and restored: what is exact, what is bounded."""
+"""Maps compressed and decompressed: what is exact, and which errors are bounded."""
 
 from __future__ import annotations
 
@@ -136,6 +136,7 @@ class TestTransfer:
         assert 0.0 < lost["fitted"] < 0.5 * min(lost["published"], lost["logarithm"])
 
 
+@pytest.mark.slow
 class TestRates:
     @pytest.fixture(autouse=True)
     def _few_modes(self, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What files of compressed maps hold, and what they may not."""
+"""The contents of compressed map files, and what makes them invalid."""
 
 from __future__ import annotations
 

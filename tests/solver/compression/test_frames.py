@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a surface, compressed and restored."""
+"""Frames of a surface, compressed and decompressed."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def frames() -> Floats:
     return UNIT * np.array(shapes) + 100.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [3e-3, 1e-5])
 def test_frames_come_back_within_the_error(error: float) -> None:
     wanted = frames()
@@ -44,6 +45,7 @@ def test_frames_come_back_within_the_error(error: float) -> None:
     assert len(data) < len(compressor.quantised_coordinates(choice.error).data)
 
 
+@pytest.mark.slow
 def test_modes_alone_follow_the_frames() -> None:
     wanted = frames()
     compressor = frame_compression.compressor(wanted, FACES, 16)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole numbers as bytes: the coder, the prediction, the rows."""
+"""Integers as bytes: the range coder, the prediction, the rows."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The search for the nearest map: its gradient is the derivative, and it ends where maps cannot be solved for."""
+"""The search for the nearest map: its gradient against finite differences, and how it ends where there is no map."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files are put in their places whole or not at all, several of them all or none."""
+"""Output files are put in place completely or not at all; several of them all or none."""
 
 from __future__ import annotations
 

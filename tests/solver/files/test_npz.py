@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files are looked at before they are opened, arrays before they are allocated; several files are written or none."""
+"""Files are checked before they are opened, arrays before they are allocated; several files are written or none."""
 
 from __future__ import annotations
 

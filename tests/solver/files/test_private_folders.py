@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Private folders go with what made them. What a sweep leaves alone is in tests/attacks/test_folders.py."""
+"""Private folders are removed with their owner. What the sweep must not remove is in tests/attacks/test_folders.py."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Large motions in small steps: maps without folds all the way, turns followed beyond half a turn."""
+"""Large motions in small steps: no folds along the way, and turns beyond half a turn are followed."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def test_a_bar_twisted_by_more_than_half_a_turn() -> None:
     angle = np.radians(220.0)
     embedding, fitter, path, done = followed(twisted(BAR, angle))
     mesh = fitter.mesh
-    # About 20 degrees a step.
-    assert 10 <= len(done) <= 20
+    # About 20 degrees a step; some of the turn is taken out of the whole.
+    assert 6 <= len(done) <= 12
     assert done == sorted(done)
     assert done[0] >= 0.0
     assert done[-1] <= 1.0
@@ -53,7 +53,7 @@ def test_a_bar_twisted_by_more_than_half_a_turn() -> None:
     offsets = (mesh.centroids - 0.5) / embedding.scale @ embedding.axes
     top = (np.abs(offsets[:, :2]).max(axis=1) < 0.45) & (offsets[:, 2] > 0.8) & (offsets[:, 2] < 1.5)
     assert top.sum() >= 5
-    turns = path.turns[top] @ embedding.axes[:, 2]
+    turns = (path.turns[top] + embedding.motion.turn) @ embedding.axes[:, 2]
     assert np.median(turns) > np.radians(180.0)
     assert turns.min() > np.radians(90.0)
 

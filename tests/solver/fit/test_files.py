@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of fitted maps come back as they were, or not at all."""
+"""Files of fitted maps are read back unchanged, or refused."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fold-free fit: derivatives against differences, no folds whatever the target, landmarks met where they can be."""
+"""The fold-free fit: derivatives against differences, no folds for any target, landmarks met where possible."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folds covered by another map: no fold is left, nothing far away moves, and what cannot be done is said."""
+"""Folds covered by another map: none is left, nothing far away moves, and failure is reported."""
 
 from __future__ import annotations
 

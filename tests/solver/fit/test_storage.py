@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stored map comes back bit for bit, or not at all."""
+"""A stored map is restored bit for bit, or refused."""
 
 from __future__ import annotations
 

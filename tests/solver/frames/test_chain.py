@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole way from two keys to frames, in both modes, and what is said about it."""
+"""The whole pipeline from two keys to frames in all modes, and its report."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Easing curves: ends fixed, never backwards, slow where they say so."""
+"""Easing curves: fixed ends, monotonic, slow where they should be."""
 
 from __future__ import annotations
 

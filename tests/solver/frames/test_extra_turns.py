@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Extra turns: who gets them, about which axis, and that keys, lengths and what is held stay as they are."""
+"""Extra turns: which parts get them, about which axis; keys, lengths and still vertices stay as they are."""
 
 from __future__ import annotations
 

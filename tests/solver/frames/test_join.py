@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chains of keys: every key met, no stop and no jerk at the inner ones, lengths held, still parts still."""
+"""Chains: every key is met, inner keys without stop or jerk, lengths kept, still parts still."""
 
 from __future__ import annotations
 

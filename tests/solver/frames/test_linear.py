@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps between the identity and a map, in both modes, where it is known what they must be."""
+"""Maps between the identity and a map, where the exact result is known."""
 
 from __future__ import annotations
 

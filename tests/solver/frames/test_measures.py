@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distortion at the vertices of every frame: known answers on grown shapes, chains, and the worst place."""
+"""Distortion at the vertices of every frame: known answers on scaled shapes, chains, and the worst place."""
 
 from __future__ import annotations
 
@@ -86,5 +86,5 @@ class TestWorstExcess:
 
     def test_no_edges(self) -> None:
         points = np.eye(3)
-        pair = KeyPair(points, points, np.empty((0, 3), dtype=np.int64), np.empty((0, 2), dtype=np.int64))
+        pair = KeyPair.checked(points, points, np.empty((0, 3), dtype=np.int64))
         assert worst_excess(pair, points[None]).excess == 0.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a control plays: the moments that it needs, and how near that comes to the motion."""
+"""What a control plays: the moments that it needs, and how close that comes to the motion."""
 
 from __future__ import annotations
 

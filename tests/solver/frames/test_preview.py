@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preview's curve: exact where it must be, smooth, and near the frames it does not know."""
+"""The preview's curve: exact at its frames, smooth, and close to frames that it does not know."""
 
 from __future__ import annotations
 

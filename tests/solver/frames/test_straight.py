@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mode ``straight``: lines between the keys, without a map."""
+"""Mode ``straight``: straight lines between the keys, without a map."""
 
 from __future__ import annotations
 

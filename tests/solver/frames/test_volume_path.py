@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map of the cube between the identity and the fitted map, rotation kept."""
+"""The map of the cube between the identity and the fitted map, with rotation interpolated."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weights of a control: what they reproduce exactly, and how near they play a known motion."""
+"""Weights of a control: what they reproduce exactly, and how close they come to a known motion."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is refused on the way in, and in which words; and the choices a user has."""
+"""Unusable input is refused with a sentence that says what to do."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps from arrays of unknown origin, and conditions of the caller's choice for rebuilding them."""
+"""Maps from arrays of any origin, and custom boundary conditions for their reconstruction."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map comes back from its own representation: exactly, on every kind of mesh."""
+"""A map is reconstructed exactly from its own representation, on every kind of mesh."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
 from qc3d_addon.solver.errors import ReconstructionError
 from qc3d_addon.solver.maps import reconstruction
-from qc3d_addon.solver.maps.reconstruction import Reconstructor
+from qc3d_addon.solver.maps.boundary_conditions import Conditions
+from qc3d_addon.solver.maps.reconstruction import Reconstructor, reconstruct
 from qc3d_addon.solver.maps.representation import (
     eigen_form,
     from_eigen_form,
@@ -177,6 +178,40 @@ def test_strong_distortion() -> None:
     stretch = stretch_of(mesh, values)
     assert np.linalg.cond(stretch).max() > 50.0
     assert np.abs(Reconstructor(mesh).rebuild(stretch, mesh.points) - values).max() < EXACT
+
+
+@pytest.mark.parametrize("steepness", [12.0, 18.0, 24.0])
+def test_very_strong_distortion(steepness: float) -> None:
+    mesh = kuhn_grid(12)
+    # Along x the closed form; along y and z something that moves as well.
+    values = sliding(mesh.points)
+    values[:, 0] = np.expm1(steepness * mesh.points[:, 0]) / np.expm1(steepness)
+    stretch = stretch_of(mesh, values)
+    assert np.linalg.cond(stretch).max() > 1e3
+    assert np.abs(Reconstructor(mesh).rebuild(stretch, mesh.points) - values).max() < EXACT
+
+
+@pytest.mark.parametrize("offset", [0.0, 2.0**10, -(2.0**20), 2.0**30])
+def test_a_mesh_far_from_the_origin(offset: float) -> None:
+    grid = kuhn_grid(8)  # whose coordinates have few digits: they are exact in every place
+    mesh = TetMesh(grid.points + offset, grid.tets)
+    shear = np.array([[1.5, 0.25, 0.0], [0.0, 0.75, 0.5], [-0.25, 0.0, 1.0]])
+    values = grid.points @ shear.T + offset
+    stretch = stretch_of(grid, grid.points @ shear.T)
+    rebuilt = reconstruct(mesh, stretch, Conditions.fixed_boundary(mesh, values)).values
+    assert np.abs(rebuilt - values).max() <= max(1e-14, np.spacing(abs(2.0 * offset)))
+
+
+def test_parts_that_lie_far_apart() -> None:
+    grid = kuhn_grid(6)
+    near, far = grid.points, grid.points + 2.0**30
+    mesh = TetMesh(np.concatenate([near, far]), np.concatenate([grid.tets, grid.tets + len(near)]))
+    shape = sliding(near)
+    values = np.concatenate([shape, shape + 2.0**30])
+    stretch = np.tile(stretch_of(grid, shape), (2, 1, 1))
+    rebuilt = reconstruct(mesh, stretch, Conditions.fixed_boundary(mesh, values)).values
+    assert np.abs(rebuilt - values)[: len(near)].max() < 1e-13
+    assert np.abs(rebuilt - values)[len(near) :].max() < 1e-6
 
 
 waves = st.lists(st.integers(0, 3), min_size=9, max_size=9).map(lambda found: np.array(found).reshape(3, 3))

@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The filled cube: a conforming partition at every quality, notes and errors of both engines."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -113,6 +115,7 @@ def test_point_clouds_are_surrounded_by_the_second_engine(name: str) -> None:
     assert smallest_dihedral_angles(filled.mesh).min() > 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_finer_qualities_have_more_tetrahedra(engine: str) -> None:
     counts = [

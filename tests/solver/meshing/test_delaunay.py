@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The engine ``delaunay``: well-shaped tetrahedra, and the same mesh for the same seed."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Poisson-disk samples: distances kept, no gaps left, grading followed."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The child process: what it is given, and that each way to fail becomes one error. Stand-ins play its part."""
+"""The meshing child process: its input, and one error for every kind of failure, with stand-ins for the program."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chebyshev's iteration: fewer steps on linear iterations, a linear function of its start, fixed points stay."""
+"""Chebyshev iteration: fewer steps on linear iterations, linear in its start, fixed points stay."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orders of elimination: complete, and with small factors."""
+"""Elimination orders: complete, and with sparse factors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qc3d_addon.solver.numerics.nested_dissection import elimination_order, fact
 
 
 def grid(side: int) -> tuple[Floats, csr_array]:
-    """Points of a square grid and a positive definite matrix that ties neighbours."""
+    """Points of a square grid and a positive definite matrix that ties neighbors."""
     line = diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(side, side))
     matrix = kron(line, eye_array(side)) + kron(eye_array(side), line) + 1e-3 * eye_array(side * side)
     ticks = np.arange(side, dtype=np.float64)

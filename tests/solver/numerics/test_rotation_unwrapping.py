@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns beyond half a turn, recovered from rotations that know their angle only up to full turns."""
+"""Angles beyond half a turn, recovered from rotations that determine them only up to full turns."""
 
 from __future__ import annotations
 

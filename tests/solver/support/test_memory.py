@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much memory a bake needs is known before it starts."""
+"""The memory that a bake needs is known before it starts."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_frames_to_compress(
 
 
 def test_the_sentence_says_what_to_do() -> None:
-    with pytest.raises(InputError, match=r"Allow it more, take fewer in-betweens or keys, or bake a coarser mesh"):
+    with pytest.raises(InputError, match=r"Raise the limit, use fewer in-betweens or keys, or bake a coarser mesh"):
         require_memory(10.0, 5.0, 3)
 
 

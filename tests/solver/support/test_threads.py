@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work in threads: results in order, nothing begun far ahead, errors in their turn."""
+"""Work in threads: results in order, nothing started far ahead, errors in their turn."""
 
 from __future__ import annotations
 

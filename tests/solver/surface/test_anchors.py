@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Components drawn along their own screws, and best turns of many point sets at once."""
+"""Components that follow their own screw motions, and batches of least-squares rotations."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rates at the ends of a path against differences of the path itself."""
+"""Rates at the ends of a path against finite differences of the path itself."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface's path: keys, still vertices and volumes exact, rigid parts rigid, turns the true way round."""
+"""The surface path: keys, still vertices and volumes exact, rigid parts rigid, turns the right way round."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class TestEveryPair:
     def test_still_vertices_stay_exactly(self, pair: tuple[Embedding, SurfacePath], time: float) -> None:
         embedding, path = pair
         still = embedding.still
-        np.testing.assert_array_equal(path.positions(time)[still], embedding.key0[still])
+        np.testing.assert_array_equal(path.positions(time)[still], embedding.straight(time)[still])
 
     def test_the_way_is_continuous(self, pair: tuple[Embedding, SurfacePath]) -> None:
         _, path = pair
@@ -154,7 +154,7 @@ class TestRigidParts:
         shape = path.positions(time)[len(BAR) :]
         rest = embedding.key0[len(BAR) :]
         lengths, kept = (np.linalg.norm(one[:, None] - one[None], axis=2) for one in (rest, shape))
-        # Near half a turn the part may go the other way, as its neighbour does; its anchors then pull at it a little.
+        # Near half a turn the part may go the other way, as its neighbor does; its anchors then pull at it a little.
         np.testing.assert_allclose(kept, lengths, rtol=0.0, atol=1e-9 if angle < 2.5 else 2e-5)
 
     def test_a_rigid_motion_of_everything_is_a_screw(self) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The system of a surface's moving vertices is the one that dense formulas give, and it solves what it should."""
+"""The linear system of a surface's moving vertices against dense formulas."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def free_vertices(seed: int) -> Bools:
 def surface_of(free: Bools, anchor_weights: Floats, springs: Ints = SPRINGS) -> MovingSurface:
     deformation = TriangleDeformation.between(POINTS, POINTS, FACES)
     closed = ClosedComponents(FACES, np.zeros(COUNT, dtype=np.int64))
-    return MovingSurface(deformation, springs, closed, free, POINTS, anchor_weights)
+    covering = FACES, np.ones(len(FACES))
+    return MovingSurface(deformation, springs, closed, covering, free, POINTS, anchor_weights)
 
 
 def dense_stiffness() -> Floats:

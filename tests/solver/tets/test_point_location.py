@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Point location: every point is found with the right weights, and points outside are refused."""
+
 from __future__ import annotations
 
 import numpy as np

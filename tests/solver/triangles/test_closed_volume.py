@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Volumes of closed components, their derivative, and the step that restores them."""
+"""Volumes of closed components, their gradients, and the step that restores them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def components_of(points: Floats, faces: Ints) -> ClosedComponents:
 
 def moving_in(components: ClosedComponents, moving: Ints) -> MovingVolumes:
     """All vertices are given, the moving ones first."""
-    return MovingVolumes(components, moving, order_of(len(components.labels), moving))
+    even = (components.faces, np.ones(len(components.faces)))
+    return MovingVolumes(components, even, moving, order_of(len(components.labels), moving))
 
 
 def order_of(count: int, moving: Ints) -> Ints:

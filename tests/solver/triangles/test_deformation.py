@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotation and stretch of triangles between two keys: against maps whose rotation and stretch are known."""
+"""Rotation and stretch of triangles, for maps whose rotation and stretch are known."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirror partners: on symmetric shapes, closed lips, and shapes without symmetry."""
+"""Mirror partners on symmetric shapes, closed lips, and shapes without symmetry."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Duplicate vertices, edges, neighbours and closed parts of triangle meshes, in every state that artists leave them."""
+"""Coincident vertices, edges, neighbors and closed components of triangle meshes in every state that artists leave."""
 
 from __future__ import annotations
 

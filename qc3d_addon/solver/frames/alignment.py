@@ -23,12 +23,12 @@ _CALM_PERCENTILE = 25.0
 _STEPS = 3
 # Of the moments of inertia: what lies in a line is not turned about it.
 _RIDGE = 1e-12
-# How fast the placement sets in beside an inner key, where it must not change velocities.
+# How fast the move sets in beside an inner key, where it must not change velocities.
 _ONSET = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class RigidMove:
     """The rigid motion x -> R (x - c) + c + d.
 
     Parameters
@@ -46,27 +46,29 @@ class Placement:
     shift: Floats
 
     @classmethod
-    def between(cls, shape: Floats, target: Floats, weights: Floats) -> Placement:
+    def between(cls, shape: Floats, target: Floats, weights: Floats) -> RigidMove:
         """Nearly the best rigid motion of the points ``shape`` (n, 3) onto ``target`` with weights (n,) of sum 1.
 
         A few Gauss-Newton steps from rest: they find what is a few degrees away and, other than the best fit, change
         gradually with the points, never by half a turn where the target is flattened or reversed.
         """
-        centre, wanted = weights @ shape, weights @ target
-        spread, goal = shape - centre, target - wanted
+        centre, offsets = weights @ shape, target - shape
+        shift = weights @ offsets
+        # Differences, not positions, go into the moments: they are zero where the target is met, which counts most.
+        spread, missing = shape - centre, offsets - shift
         turned, rotation = spread, np.eye(3)
-        squares = float(weights @ (spread**2).sum(axis=1))
+        floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
         for _ in range(_STEPS):
-            products = turned.T @ (weights[:, None] * turned)
-            inertia = (squares * (1.0 + _RIDGE) + 1e-300) * np.eye(3) - products
-            moment = weights @ np.cross(turned, goal)
+            levers = np.cross(turned[:, None], np.eye(3))
+            inertia = np.einsum("n,nia,nja->ij", weights, levers, levers) + floor * np.eye(3)
+            moment = weights @ np.cross(turned, missing - (turned - spread))
             step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
             turned, rotation = turned @ step.T, step @ rotation
-        return cls(rotation_vectors(rotation[None])[0], centre, wanted - centre)
+        return cls(rotation_vectors(rotation[None])[0], centre, shift)
 
-    def scaled(self, part: float) -> Placement:
+    def scaled(self, part: float) -> RigidMove:
         """A part, 0..1, of the motion."""
-        return Placement(part * self.turn, self.centre, part * self.shift)
+        return RigidMove(part * self.turn, self.centre, part * self.shift)
 
     def apply(self, points: Floats) -> Floats:
         """Points (k, 3), carried along."""
@@ -81,7 +83,7 @@ class Placement:
         return np.asarray(rotation_matrices(self.turn[None])[0])
 
 
-class Placer:
+class CalmAlignment:
     """Places the shapes of an embedded pair.
 
     Parameters
@@ -98,17 +100,17 @@ class Placer:
         self._knows = not turns
         self._weights = _calm_weights(embedding.travel, embedding.weights)
 
-    def beside(self, inner: tuple[bool, bool]) -> Placer:
+    def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
         other = copy.copy(self)
         other._inner = inner
         return other
 
-    def of(self, shape: Floats, time: float) -> Placement:
+    def of(self, shape: Floats, time: float) -> RigidMove:
         """Where to carry a shape (n, 3) at ``time``, cube units."""
         if not self._knows:
-            return Placement(np.zeros(3), np.zeros(3), np.zeros(3))
-        whole = Placement.between(shape, self._embedding.straight(time), self._weights)
+            return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
+        whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
         return whole.scaled(_onset(time, self._inner))
 
 
@@ -130,7 +132,7 @@ def _calm_weights(travel: Floats, areas: Floats) -> Floats:
 
 
 def _onset(time: float, inner: tuple[bool, bool]) -> float:
-    """The part of the placement, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
+    """The part of the move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
     before = 1.0 - (1.0 - time) ** _ONSET if inner[0] else 1.0
     after = 1.0 - time**_ONSET if inner[1] else 1.0
     return before * after

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.fit.fit_pair import fit_pair
-from qc3d_addon.solver.frames.placement import Placement, Placer
+from qc3d_addon.solver.frames.alignment import CalmAlignment, RigidMove
 from qc3d_addon.solver.keys.embedding import Embedding
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
@@ -41,18 +41,18 @@ class TestPlacement:
     def test_finds_a_small_rigid_motion(self) -> None:
         turn, shift = np.array([0.05, -0.08, 0.03]), np.array([0.2, 0.1, -0.3])
         target = CLOUD @ rotation_matrices(turn[None])[0].T + shift
-        found = Placement.between(CLOUD, target, WEIGHTS)
+        found = RigidMove.between(CLOUD, target, WEIGHTS)
         np.testing.assert_allclose(found.apply(CLOUD), target, rtol=0.0, atol=1e-6)
         vectors = found.apply(CLOUD[1:]) - found.apply(CLOUD[:1])
         np.testing.assert_allclose(found.undo_vectors(vectors), CLOUD[1:] - CLOUD[:1], rtol=0.0, atol=1e-12)
 
     @pytest.mark.parametrize("target", [np.zeros_like(CLOUD), -CLOUD, 1e-9 * CLOUD])
     def test_turns_nothing_toward_what_is_flattened_or_reversed(self, target: np.ndarray) -> None:
-        assert np.linalg.norm(Placement.between(CLOUD, target, WEIGHTS).turn) < 1e-6
+        assert np.linalg.norm(RigidMove.between(CLOUD, target, WEIGHTS).turn) < 1e-6
 
     @pytest.mark.parametrize("points", [np.outer(CLOUD[:, 0], [1.0, 2.0, 3.0]), np.zeros_like(CLOUD)])
     def test_points_in_a_line_or_in_one_place(self, points: np.ndarray) -> None:
-        found = Placement.between(points, points + 1.0, WEIGHTS)
+        found = RigidMove.between(points, points + 1.0, WEIGHTS)
         np.testing.assert_allclose(found.apply(points), points + 1.0, rtol=0.0, atol=1e-9)
 
     def test_still_vertices_hold_the_rest(self) -> None:
@@ -60,8 +60,9 @@ class TestPlacement:
         key1[:9] = BAR[:9]
         embedding = Embedding.of(KeyPair.checked(BAR, key1, FACES))
         drifted = embedding.straight(0.5) @ rotation_matrices(np.array([[0.0, 0.02, 0.0]]))[0].T + 0.01
-        placed = Placer(embedding).of(drifted, 0.5).apply(drifted)
-        np.testing.assert_allclose(placed[embedding.still], embedding.key0[embedding.still], rtol=0.0, atol=1e-6)
+        placed = CalmAlignment(embedding).of(drifted, 0.5).apply(drifted)
+        still, line = embedding.still, embedding.straight(0.5)
+        np.testing.assert_allclose(placed[still], line[still], rtol=0.0, atol=1e-6)
 
 
 def test_calm_parts_go_straight_where_nothing_is_still() -> None:

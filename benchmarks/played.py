@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender plays of a bake, beside the frames that the solver computes: python -m benchmarks.played [PAIR …].
+
+Each pair, the listed ones unless some are named, becomes two shape keys, is baked with the default settings on the
+key's own value and on a slider, and is evaluated by Blender at 49 even positions. The figures are the worst of the
+inner positions, as in ``measures``: ``edge_excess_p99`` / ``volume_dev``, and the largest distance of a vertex from the
+computed frame, over the diagonal. "new crossings" are pairs of triangles beyond those of the worse key.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from qc3d_addon.blender.bake.request import BakeRequest, PlayOn
+from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.store.mesh_data import set_key_coordinates
+from qc3d_addon.solver.frames.task import Task, carry_out
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import finish
+
+from .catalogue import Catalogue, Floats, Ints, Pair
+from .measures import Judge
+
+POSITIONS = 49
+CONTROLS: tuple[PlayOn, ...] = ("key", "slider")
+
+
+def main(arguments: list[str]) -> None:
+    """Print the table."""
+    catalogue = Catalogue()
+    pairs = [catalogue.find(text) for text in arguments] or [pair for pair in catalogue.pairs if pair.listed]
+    print("| pair | straight blend | computed | on the key, d | on a slider, d | new crossings: computed, played |")
+    print("|---|---|---|---|---|---|")
+    for pair in pairs:
+        faces, first, second = pair.load()
+        times = np.linspace(0.0, 1.0, POSITIONS)
+        judge = Judge(faces, first, second)
+        straight = Judge(faces, first, second, crossings=False).sequence(
+            first + times[:, None, None] * (second - first), times
+        )
+        frames = computed(pair, faces, first, second, times)
+        known = judge.sequence(frames, times)["worst"]
+        cells, crossings = [], [known["intersections"]]
+        for control in CONTROLS:
+            shapes = played(pair, faces, first, second, times, control)
+            found = judge.sequence(shapes, times)["worst"]
+            distance = float(np.linalg.norm(shapes - frames, axis=2).max()) / judge.diagonal
+            cells.append(f"{figures(found)}, {distance:.0e}")
+            crossings.append(found["intersections"])
+        counts = f"{crossings[0]}, {max(crossings[1:])}"
+        cells = [str(pair), figures(straight["worst"]), figures(known), *cells, counts]
+        print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def figures(worst: dict[str, Any]) -> str:
+    """Lengths and volume of the worst position."""
+    volume = "" if worst["volume_dev"] is None else f" / {worst['volume_dev']:.4f}"
+    return f"{worst['edge_excess_p99']:.4f}{volume}"
+
+
+def computed(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats) -> Floats:
+    """Frames (k, n, 3) of the solver, default settings."""
+    options = FitOptions(extra_turns=pair.extra_turns)
+    task = Task.of_keys({"a": first, "b": second}, faces, None, ("a", "b"), options)
+    bake = finish(carry_out(replace(task, times=times))).bake
+    assert bake is not None
+    return bake.frames
+
+
+def played(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats, control: PlayOn) -> Floats:
+    """Shapes (k, n, 3) that Blender shows as a control of a bake is moved, default settings."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = bpy.data.meshes.new("Mesh")
+    mesh.from_pydata(first.tolist(), [], faces.tolist())
+    obj = bpy.data.objects.new("Object", mesh)
+    bpy.context.collection.objects.link(obj)
+    for name, shape in (("Basis", first), ("Up", second)):
+        key = obj.shape_key_add(name=name, from_mix=False)
+        key.value = 0.0
+        set_key_coordinates(key, shape.astype(np.float32))
+    options = FitOptions(extra_turns=pair.extra_turns)
+    result = bake_object(obj, BakeRequest(("Basis", "Up"), fit_options=options, play_on=control))
+    shapes = []
+    for time in times.tolist():
+        if control == "key":
+            mesh.shape_keys.key_blocks["Up"].value = time
+            mesh.shape_keys.update_tag()
+        else:
+            obj[result.slider] = time
+            obj.update_tag()
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        values = np.empty(3 * len(evaluated.vertices), dtype=np.float32)
+        evaluated.vertices.foreach_get("co", values)
+        shapes.append(values.reshape(-1, 3).astype(np.float64))
+    return np.stack(shapes)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

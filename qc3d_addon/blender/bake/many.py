@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every key at once, each on itself: which keys there are, and what becomes of each, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import bpy
+import numpy as np
+
+from ...solver.errors import InputError, QC3DError
+from ..keys import chain_keys
+from ..store import checks
+from ..store.records import Record
+from ..store.renames import digest
+from .plan import Plan, plan_bake, write_bake
+from .request import BakeRequest
+
+if TYPE_CHECKING:
+    from ...solver.frames.task import Outcome
+
+# A straight blend that leaves the motion by less, of the size, needs no in-betweens: a hair's breadth on a character.
+STRAIGHT_ENOUGH = 1e-3
+
+Ended = Literal["baked", "straight", "left", "failed"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one key.
+
+    Parameters
+    ----------
+    key
+        Its name.
+    ended
+        ``baked``; ``straight``: it needs no in-betweens; ``left``: nothing was to be done; ``failed``.
+    text
+        That in words.
+    report
+        Of the bake, as plain values; empty where there was none.
+    """
+
+    key: str
+    ended: Ended
+    text: str
+    report: dict[str, Any]
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.text}"
+
+
+def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
+    """The keys of an object that are its user's own and have a value to play in-betweens on.
+
+    Raises
+    ------
+    InputError
+        If the object cannot be baked.
+    """
+    keys = checks.require_object(obj).data.shape_keys
+    made = {key.name for chain in Record.read(keys).chains for key in chain_keys.owned_keys(keys, chain).values()}
+    return [key.name for key in keys.key_blocks if key != keys.reference_key and key.name not in made]
+
+
+def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
+    """The names, each once; raises InputError where one is no key that in-betweens can play on."""
+    known, blocks = bakeable_keys(obj), obj.data.shape_keys.key_blocks
+    for name in names:
+        if name not in blocks:
+            raise InputError(f"There is no shape key '{name}' on '{obj.name}'; choose from those of the mesh.")
+        if name not in known:
+            raise InputError(f"'{name}' cannot play in-betweens: it is the Basis, or an in-between itself.")
+    if not names:
+        raise InputError(f"No shape key of '{obj.name}' is chosen; select some in the list of shape keys.")
+    return list(dict.fromkeys(names))
+
+
+def plan_key(obj: bpy.types.Object, name: str, choices: BakeRequest) -> Plan | Verdict:
+    """What to compute for a key, or what there is to say where nothing is to be computed.
+
+    Parameters
+    ----------
+    choices
+        Everything but the keys; a chain that the key plays already keeps the keys that it goes through.
+    """
+    try:
+        keys = checks.require_object(obj).data.shape_keys
+        chain = Record.read(keys).chain_on_key(name)
+        base = keys.key_blocks[name].relative_key.name
+        through = chain.through if chain is not None and chain.through[0] == base else (base, name)
+        request = replace(choices, keys=through, play_on="key", keyframes=None)
+        if chain is not None and chain.through == through and chain.request == request.remembered():
+            is_whole = chain_keys.owned_keys(keys, chain).keys() == chain.keys.keys()
+            if is_whole and chain.digests == tuple(digest(keys.key_blocks[other]) for other in through):
+                return Verdict(name, "left", "baked already, and its keys are as they were", {})
+        plan = plan_bake(obj, request)
+    except QC3DError as error:
+        return Verdict(name, "failed", str(error), {})
+    pair = next(iter(plan.task.pairs.values()))
+    if len(plan.task.pairs) == 1 and np.array_equal(pair.key0, pair.key1):
+        return Verdict(name, "left", f"shows the same as '{base}'", {})
+    return plan
+
+
+def write_key(plan: Plan, outcome: Outcome | QC3DError) -> Verdict:
+    """Write the in-betweens of a key, unless it needs none; what became of it."""
+    name = plan.request.keys[-1]
+    if isinstance(outcome, QC3DError):
+        return Verdict(name, "failed", str(outcome), {})
+    missed = _beyond_straight(plan, outcome)
+    if missed < STRAIGHT_ENOUGH:
+        return Verdict(name, "straight", f"straight is enough: {missed:.2%}", {})
+    try:
+        result = write_bake(plan, outcome)
+    except QC3DError as error:
+        return Verdict(name, "failed", str(error), {})
+    return Verdict(name, "baked", _words(result.report), result.report)
+
+
+def bake_keys(
+    obj: bpy.types.Object,
+    names: Sequence[str],
+    choices: BakeRequest,
+    carry_out: Callable[[Plan, int], Outcome],
+) -> list[Verdict]:
+    """Bake keys of an object, one after the other, each on itself, with nothing written before all are done.
+
+    Parameters
+    ----------
+    carry_out
+        Does the work of a plan, which is that of the key of this number; may raise QC3DError.
+    """
+    done: list[tuple[Plan, Outcome | QC3DError] | Verdict] = []
+    for number, name in enumerate(require_own_keys(obj, names)):
+        plan = plan_key(obj, name, choices)
+        if isinstance(plan, Verdict):
+            done.append(plan)
+            continue
+        try:
+            done.append((plan, carry_out(plan, number)))
+        except QC3DError as error:
+            done.append((plan, error))
+    return [one if isinstance(one, Verdict) else write_key(*one) for one in done]
+
+
+def summary(verdicts: Sequence[Verdict]) -> str:
+    """One sentence about all keys."""
+    ends = [verdict.ended for verdict in verdicts]
+    counts = {ended: ends.count(ended) for ended in ("baked", "straight", "left")}
+    failed = len(verdicts) - sum(counts.values())
+    parts = [f"{counts['baked']} of {len(verdicts)} keys got in-betweens"]
+    parts += [f"straight is enough for {counts['straight']}"] if counts["straight"] else []
+    parts += [f"{counts['left']} were left as they are"] if counts["left"] else []
+    parts += [f"{failed} cannot be baked"] if failed else []
+    return f"{'; '.join(parts)}."
+
+
+def _beyond_straight(plan: Plan, outcome: Outcome) -> float:
+    """How far the motion leaves the straight blend, over the size; infinite where it goes through other keys."""
+    bake = outcome.bake
+    if bake is None or len(plan.request.keys) > 2:
+        return float("inf")
+    times = bake.times[:, None, None]
+    straight = (1.0 - times) * bake.frames[0] + times * bake.frames[-1]
+    diagonal = next(iter(plan.task.pairs.values())).diagonal
+    return float(np.linalg.norm(bake.frames - straight, axis=2).max(initial=0.0)) / diagonal
+
+
+def _words(report: dict[str, Any]) -> str:
+    """What a bake made of a key: how many in-betweens, and what is wrong with them."""
+    count, crossings, folds = report["count"], report["crossings"], report["folds"]["frames"]
+    words = f"{count} in-between{'' if count == 1 else 's'}"
+    known = [crossed or 0 for crossed in crossings]
+    if max(known):
+        worst = int(np.argmax(known))
+        words += f", crosses in {known[worst]} pairs at {report['places'][worst]:.2f}"
+    elif report["played"]["crossings"]:
+        words += f", crosses in {report['played']['crossings']} pairs between them"
+    if folds and any(folds):
+        words += f", {sum(folds)} folds"
+    return words

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an earlier bake made for a chain and what plays it, as they are in the file now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...solver.errors import InputError
+from ..store.records import Chain
+from . import drivers
+from .control import Control, path_of, value_path
+
+
+def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
+    """The shape keys that earlier bakes made for a chain and that are still there, by step.
+
+    A key is owned where the record names it and its driver still reads the control. A name that the record has and the
+    mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver. A key that
+    was moved to the top, where all others refer to it, is the animator's own from then on.
+    """
+    curves = drivers.driven_by(keys, path_of(chain))
+    curves.pop(value_path(keys.reference_key.name), None)
+    owned, missing = {}, []
+    for step, name in chain.keys.items():
+        if name in keys.key_blocks and value_path(name) in curves:
+            owned[step] = keys.key_blocks[name]
+        else:
+            missing.append(step)
+    recorded = set(owned.values())
+    others = [key for key in keys.key_blocks if key not in recorded and value_path(key.name) in curves]
+    weights = chain.weights if missing and others else None
+    for step in missing if weights is not None else ():
+        renamed = [key for key in others if drivers.shows(curves[value_path(key.name)], weights, step)]
+        if len(renamed) == 1:
+            owned[step] = renamed[0]
+    return owned
+
+
+def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
+    """As ``owned_keys``; raises InputError where one is missing."""
+    owned = owned_keys(keys, chain)
+    if owned.keys() != chain.keys.keys():
+        raise InputError(f"Shape keys of '{chain.slider}' were deleted; re-bake it first.")
+    return owned
+
+
+def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
+    """What plays the chain: a key's value, or its slider.
+
+    The slider is that on the object of an earlier bake (objects may share a mesh), else that on ``obj``.
+    """
+    if chain.on_key:
+        return Control(obj.data.shape_keys, chain.on_key)
+    for driver in _drivers(obj.data.shape_keys, chain):
+        owner = driver.variables[0].targets[0].id
+        if isinstance(owner, bpy.types.Object):
+            return Control(owner, chain.slider)
+    return Control(obj, chain.slider)
+
+
+def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
+    """Whether Blender has stopped the chain's drivers, which it does for good where the slider was NaN once."""
+    driver = next(_drivers(keys, chain), None)
+    return driver is not None and not driver.is_valid
+
+
+def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
+    """Start drivers again that Blender has stopped."""
+    for curve in drivers.driven_by(keys, path_of(chain)).values():
+        curve.driver.is_valid = True
+    keys.update_tag()
+
+
+def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
+    """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
+    path = path_of(chain)
+    for name in chain.keys.values():
+        driver = drivers.driver_of(keys, name, path)
+        if driver is not None:
+            yield driver
+    yield from (curve.driver for curve in drivers.driven_by(keys, path).values())
+
+
+def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:
+    """What the chain's keys are relative to: that of the key that plays them, or the Basis."""
+    key = keys.key_blocks.get(chain.on_key) if chain.on_key else None
+    return keys.reference_key if key is None else key.relative_key

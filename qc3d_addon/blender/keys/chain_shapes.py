@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shapes of a chain: what its keys have to hold, and what its control shows at each step."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.errors import QC3DError
+from ..store.mesh_data import key_coordinates, shown_coordinates
+from ..store.records import Chain
+from .chain_keys import all_owned_keys, base_key
+
+
+def shapes_by_step(
+    obj: bpy.types.Object, met: dict[int, str], frames: NDArray[np.float64]
+) -> dict[int, NDArray[np.float32]]:
+    """The shapes that a slider of its own needs keys for: every frame but the Basis, which shows where no key is on.
+
+    Parameters
+    ----------
+    met
+        Names of the user's own keys by the step that shows them.
+    frames
+        (k, n, 3) positions from the first key to the last.
+
+    Returns
+    -------
+    (n, 3) float32 positions by step, the user's keys bit for bit.
+
+    Raises
+    ------
+    QC3DError
+        If the frames are not finite positions of the mesh's vertices.
+    """
+    shapes = dict(enumerate(_rounded(obj, frames)))
+    for step, name in met.items():
+        if name == obj.data.shape_keys.reference_key.name:
+            del shapes[step]
+        else:
+            shapes[step] = shown_coordinates(obj, name)
+    return shapes
+
+
+def offsets_by_step(
+    obj: bpy.types.Object, places: tuple[float, ...], frames: NDArray[np.float64]
+) -> dict[int, NDArray[np.float32]]:
+    """What keys that a key's own value plays add to it: at each step, what its frame has beyond the straight blend.
+
+    Parameters
+    ----------
+    places
+        Of the steps, as values of the key.
+    frames
+        (k, n, 3) positions at them, from what the key is relative to up to the key.
+
+    Returns
+    -------
+    (n, 3) float32 by step, absolute positions for keys that are relative to what that key is relative to.
+
+    Raises
+    ------
+    QC3DError
+        If the frames are not finite positions of the mesh's vertices.
+    """
+    at = np.array(places)[:, None, None]
+    offsets = _rounded(obj, frames - at * (frames[-1] - frames[0]))
+    return {step: offsets[step] for step in range(1, len(places) - 1)}
+
+
+def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
+    """(k, n, 3) what a chain's control shows at each of its steps, whatever was sculpted since.
+
+    Raises
+    ------
+    InputError
+        If keys of the chain are missing.
+    """
+    keys = obj.data.shape_keys
+    owned = all_owned_keys(keys, chain)
+    first = key_coordinates(obj, base_key(keys, chain).name).astype(np.float64)
+    # What the key itself adds where its own value plays the chain.
+    whole = shown_coordinates(obj, chain.on_key) - first if chain.on_key else np.zeros_like(first)
+    return np.stack(
+        [
+            (key_coordinates(obj, owned[step].name) if step in owned else first) + place * whole
+            for step, place in enumerate(chain.places)
+        ]
+    )
+
+
+def _rounded(obj: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Frames (k, n, 3) as shape keys hold them; raises QC3DError where they cannot."""
+    if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
+        raise QC3DError(
+            f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
+        )
+    with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
+        rounded = frames.astype(np.float32)
+    if not np.isfinite(rounded).all():
+        raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")
+    return np.asarray(rounded)

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What plays a chain: a number in the file that the drivers of the chain's shape keys read.
+
+It is the value of a key that the user has, whose control then plays the arc, or a slider of the chain's own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import bpy
+
+from ...solver.errors import InputError
+from ..store.records import Chain
+
+
+class Control(NamedTuple):
+    """The value of a shape key, or a custom property of an object.
+
+    Parameters
+    ----------
+    owner
+        The data block that has it: shape keys, or an object.
+    name
+        What it is called there.
+    """
+
+    owner: bpy.types.ID
+    name: str
+
+    @property
+    def is_key(self) -> bool:
+        """Whether it is the value of a shape key."""
+        return isinstance(self.owner, bpy.types.Key)
+
+    @property
+    def path(self) -> str:
+        """Its path from the owner."""
+        return value_path(self.name) if self.is_key else slider_path(self.name)
+
+    @property
+    def id_type(self) -> str:
+        """The type of its owner, as drivers name it."""
+        return 'KEY' if self.is_key else 'OBJECT'
+
+    @property
+    def is_there(self) -> bool:
+        """Whether its owner has it."""
+        return self.name in (self.owner.key_blocks if self.is_key else self.owner)
+
+    @property
+    def value(self) -> float:
+        """Where it is; the control must have no ``problem``."""
+        return float(self.owner.key_blocks[self.name].value if self.is_key else self.owner[self.name])
+
+    @property
+    def shown(self) -> tuple[bpy.types.bpy_struct, str]:
+        """What has it and as which property, for a panel to draw."""
+        return (self.owner.key_blocks[self.name], "value") if self.is_key else (self.owner, self.path)
+
+    @property
+    def problem(self) -> str | None:
+        """Why it cannot play anything, or None. Quick enough for a panel."""
+        owner, name = self.owner, self.name
+        if not self.is_there:
+            if self.is_key:
+                return f"Shape key '{name}', which plays these in-betweens, was deleted; remove them."
+            return f"The slider '{name}' was deleted; re-bake it first."
+        if not self.is_number:
+            return (
+                f"The slider '{name}' of '{owner.name}' is not a number any more; delete that custom property, then "
+                "re-bake to have it again."
+            )
+        if math.isnan(self.value):
+            return f"The slider '{name}' of '{owner.name}' has no value (NaN); give it one, or mend what drives it."
+        return None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it has a type that can play anything: the user may give a slider any other."""
+        return self.is_key or isinstance(self.owner[self.name], (bool, int, float))
+
+    def require(self) -> None:
+        """Raise InputError where it cannot play anything."""
+        problem = self.problem
+        if problem is not None:
+            raise InputError(problem)
+
+    def put(self, value: float) -> str | None:
+        """Set it, or say why it stays where it is."""
+        if self.is_key:
+            animation = self.owner.animation_data
+            if animation is not None and animation.drivers.find(self.path) is not None:
+                return f"Key '{self.name}' is driven and stays where it is."
+            self.owner.key_blocks[self.name].value = value
+        elif isinstance(self.owner[self.name], float):
+            self.owner[self.name] = value
+        else:
+            return f"The slider '{self.name}' has whole numbers only and stays where it is."
+        self.owner.update_tag()
+        return None
+
+    def of(self, owner: bpy.types.ID) -> Control:
+        """The same control of another data block, such as a copy."""
+        return self._replace(owner=owner)
+
+
+def path_of(chain: Chain) -> str:
+    """The path of what plays a chain, from the data block that has it."""
+    return value_path(chain.on_key) if chain.on_key else slider_path(chain.slider)
+
+
+def slider_path(name: str) -> str:
+    """The path of a custom property from its object."""
+    return f'["{bpy.utils.escape_identifier(name)}"]'
+
+
+def value_path(key_name: str) -> str:
+    """The path of a shape key's value from its data block."""
+    return _key_path(key_name, "value")
+
+
+def mute_path(key_name: str) -> str:
+    """The path of whether a shape key is muted, from its data block."""
+    return _key_path(key_name, "mute")
+
+
+def _key_path(key_name: str, what: str) -> str:
+    return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].{what}'

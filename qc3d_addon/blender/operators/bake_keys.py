@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that bakes many keys of an object in one run, each on itself."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from typing import TYPE_CHECKING, Union
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty
+
+from ...solver.errors import QC3DError
+from .. import live_scrub
+from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
+from ..bake.plan import Plan
+from ..properties import BakeChoices, bake_request, fill_from_panel
+from .child_work import ChildWork
+from .common import poll_active_object
+
+if TYPE_CHECKING:
+    from ...solver.frames.task import Outcome
+
+
+class KeyChoice(bpy.types.PropertyGroup):
+    """A key with a tick, by its name."""
+
+    use: BoolProperty(name="Bake", description="Bake in-betweens on this key", default=True)
+
+
+class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
+    """Bake in-betweens on many shape keys of the object in one run; keys that need none are left alone"""
+
+    bl_idname = "qc3d.bake_keys"
+    bl_label = "Bake Keys"
+
+    which: EnumProperty(
+        name="Keys",
+        description="The keys to bake",
+        items=[
+            ("all", "All", "Every key but the Basis and what was baked"),
+            ("selected", "Selected", "Those selected in the list of shape keys, from Blender 5 on; else asks"),
+            ("named", "Named", "Those with a tick among the operator's keys"),
+        ],
+        default="all",
+        options={'SKIP_SAVE'},
+    )
+    keys: CollectionProperty(
+        name="Keys", description="Keys to bake, as [{\"name\": key}, …]", type=KeyChoice, options={'SKIP_SAVE'}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self._asks = self.which == "selected" and not _can_select() and not bpy.app.background
+        if not self._asks:
+            return super().invoke(context, event)
+        self.keys.clear()
+        for name in bakeable_keys(context.active_object):
+            self.keys.add().name = name
+        self.which = "named"
+        return set(context.window_manager.invoke_props_dialog(self))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column()
+        for key in self.keys:
+            column.prop(key, "use", text=key.name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if getattr(self, "_asks", False):  # the list was confirmed
+            return self._guarded(context, lambda: self._begin(context, self.plan(context)))
+        return super().execute(context)
+
+    @property
+    def part(self) -> tuple[int, int]:
+        return (self._number, max(len(self._names), 1))
+
+    def plan(self, context: bpy.types.Context) -> Plan | None:
+        obj = context.active_object
+        fill_from_panel(self.properties, obj.qc3d)
+        self._choices = bake_request(self, ("", ""))
+        self._names = require_own_keys(obj, self._chosen(obj))
+        self._number = -1
+        self._done: list[tuple[Plan, Outcome | QC3DError] | Verdict] = []
+        return self._next(context)
+
+    def following(
+        self, context: bpy.types.Context, plan: Plan, outcome: Union["Outcome", QC3DError]
+    ) -> Plan | None:
+        self._done.append((plan, outcome))
+        return self._next(context)
+
+    def write_all(self, plan: Plan | None, outcome: Union["Outcome", QC3DError, None]) -> list[str]:
+        live_scrub.end()
+        verdicts = [one if isinstance(one, Verdict) else write_key(*one) for one in self._done]
+        return [*map(str, verdicts), summary(verdicts)]
+
+    def _next(self, context: bpy.types.Context) -> Plan | None:
+        """The plan of the next key that has one."""
+        for number in range(self._number + 1, len(self._names)):
+            self._number = number
+            plan = plan_key(context.active_object, self._names[number], self._choices)
+            if not isinstance(plan, Verdict):
+                return plan
+            self._done.append(plan)
+        return None
+
+    def _chosen(self, obj: bpy.types.Object) -> list[str]:
+        if self.which == "named" or (self.which == "selected" and len(self.keys)):
+            return [key.name for key in self.keys if key.use]
+        known = bakeable_keys(obj)
+        if self.which == "all":
+            return known
+        return [name for name in known if getattr(obj.data.shape_keys.key_blocks[name], "select", False)]
+
+
+def _can_select() -> bool:
+    """Whether this Blender knows which shape keys are selected."""
+    return "select" in bpy.types.ShapeKey.bl_rna.properties

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The planes across which Mirror modifiers show a mesh again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...solver.errors import InputError
+
+if TYPE_CHECKING:
+    from ...solver.keys.halves import MirrorPlane
+
+# Of the mesh's size, where copies on the plane are not merged: coordinates that are meant to be 0.
+_ON_PLANE = 1e-6
+
+
+def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
+    """The planes of the Mirror modifiers that are on in the viewport, in the object's own space, in their order.
+
+    An axis that is bisected is left out: what is across it is cut away, so the mesh is more than one half.
+
+    Raises
+    ------
+    InputError
+        If an object has no size along an axis, so that nothing can be mirrored across it.
+    """
+    planes = []
+    for modifier in obj.modifiers:
+        if modifier.type == "MIRROR" and modifier.show_viewport:
+            chosen = zip(modifier.use_axis, modifier.use_bisect_axis, strict=True)
+            for axis, (is_mirrored, is_bisected) in enumerate(chosen):
+                if is_mirrored and not is_bisected:
+                    planes.append(_plane(obj, modifier, axis))
+    return tuple(planes)
+
+
+def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int) -> MirrorPlane:
+    from ...solver.keys.halves import MirrorPlane
+
+    # A vertex is merged with its image, which is twice as far from it as the plane is.
+    reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * max(obj.dimensions)
+    if modifier.mirror_object is None:
+        return MirrorPlane.across(axis, reach)
+    own, other = (np.array(shown.matrix_world, dtype=np.float64) for shown in (obj, modifier.mirror_object))
+    try:
+        seen = np.linalg.inv(own) @ other
+        normal = np.linalg.inv(seen)[axis, :3]
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"'{obj.name}' or its mirror object '{modifier.mirror_object.name}' has no size along an axis; nothing can "
+            f"be mirrored by '{modifier.name}'. Give it a scale other than 0."
+        ) from error
+    # Scaled so that heights over the plane are distances along the direction.
+    length = float(np.linalg.norm(seen[:3, axis]))
+    normal, direction = normal * length, seen[:3, axis] / length
+    return MirrorPlane(tuple(normal.tolist()), tuple(direction.tolist()), float(normal @ seen[:3, 3]), reach)

@@ -15,6 +15,7 @@ import numpy as np
 
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.kinds import mesh_of
 from qc3d_addon.blender.store.mesh_data import key_coordinates, triangles
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.collision.crossings import crossing_pairs
@@ -43,10 +44,10 @@ def main() -> None:
 
 def crossings(lid: bpy.types.Object, shapes: list[Floats]) -> list[int]:
     """Number of crossing pairs of a triangle of the lid and one of the eyeball, for each shape (n, 3) of the lid."""
-    eyeball = bpy.data.objects["Eyeball"].data
+    eyeball = mesh_of(bpy.data.objects["Eyeball"])
     points = np.array([vertex.co[:] for vertex in eyeball.vertices])
-    faces = triangles(lid.data)
-    both = np.concatenate([faces, triangles(eyeball) + len(lid.data.vertices)]).astype(np.int64)
+    faces = triangles(mesh_of(lid))
+    both = np.concatenate([faces, triangles(eyeball) + len(mesh_of(lid).vertices)]).astype(np.int64)
     pairs = [crossing_pairs(np.concatenate([shape, points]), both) for shape in shapes]
     return [int(((found < len(faces)).sum(axis=1) == 1).sum()) for found in pairs]
 

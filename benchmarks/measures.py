@@ -27,6 +27,7 @@ Measures of a sequence
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -98,10 +99,11 @@ def count_crossings(positions: Floats, faces: Ints) -> int | None:
     """Number of crossing pairs of triangles that share no vertex; None where Blender's module is missing."""
     try:
         import bpy  # noqa: F401  (mathutils comes with it)
-        from mathutils.bvhtree import BVHTree  # type: ignore[import-not-found,unused-ignore]
+        from mathutils.bvhtree import BVHTree
     except ImportError:
         return None
-    tree = BVHTree.FromPolygons(positions.tolist(), faces.tolist(), all_triangles=True, epsilon=0.0)
+    tree_of: Callable[..., Any] = BVHTree.FromPolygons  # some stubs say that it returns nothing
+    tree = tree_of(positions.tolist(), faces.tolist(), all_triangles=True, epsilon=0.0)
     pairs = np.array(tree.overlap(tree), dtype=np.int64).reshape(-1, 2)
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]

@@ -19,6 +19,7 @@ import numpy as np
 
 from qc3d_addon.blender.bake.request import BakeRequest, PlayOn
 from qc3d_addon.blender.bake.run import bake_object
+from qc3d_addon.blender.kinds import keys_of, mesh_of, present
 from qc3d_addon.blender.store.mesh_data import set_key_coordinates
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.settings import FitOptions
@@ -79,7 +80,7 @@ def played(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(first.tolist(), [], faces.tolist())
     obj = bpy.data.objects.new("Object", mesh)
-    bpy.context.collection.objects.link(obj)
+    present(bpy.context.collection).objects.link(obj)
     for name, shape in (("Basis", first), ("Up", second)):
         key = obj.shape_key_add(name=name, from_mix=False)
         key.value = 0.0
@@ -89,12 +90,12 @@ def played(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats
     shapes = []
     for time in times.tolist():
         if control == "key":
-            mesh.shape_keys.key_blocks["Up"].value = time
-            mesh.shape_keys.update_tag()
+            keys_of(obj).key_blocks["Up"].value = time
+            keys_of(obj).update_tag()
         else:
             obj[result.slider] = time
             obj.update_tag()
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        evaluated = mesh_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
         values = np.empty(3 * len(evaluated.vertices), dtype=np.float32)
         evaluated.vertices.foreach_get("co", values)
         shapes.append(values.reshape(-1, 3).astype(np.float64))

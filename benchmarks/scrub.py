@@ -83,13 +83,14 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     """Median seconds from moving the slider to the evaluated mesh."""
     import bpy
 
+    from qc3d_addon.blender.kinds import keys_of, mesh_of, present
     from qc3d_addon.blender.store.mesh_data import key_coordinates, set_key_coordinates
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(pair.key0.tolist(), [], pair.faces.tolist())
     obj = bpy.data.objects.new("Object", mesh)
-    bpy.context.collection.objects.link(obj)
+    present(bpy.context.collection).objects.link(obj)
     obj.shape_key_add(name="Basis")
     for knot in BAKED.knots[1:]:
         key = obj.shape_key_add(name=str(knot), from_mix=False)
@@ -101,8 +102,8 @@ def _step_in_blender(pair: KeyPair, curve: PreviewCurve) -> float:
     for number in range(_UPDATES):
         basis = key_coordinates(obj, "Basis")
         set_key_coordinates(preview, basis + curve.beyond(number / _UPDATES, BAKED))
-        mesh.shape_keys.update_tag()
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        keys_of(obj).update_tag()
+        evaluated = mesh_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
         evaluated.corner_normals[0].vector.copy()
         marks.append(clock.perf_counter())
     return float(np.median(np.diff(marks)))

@@ -7,8 +7,10 @@ nothing below the Blender layer imports Blender's modules.
 from __future__ import annotations
 
 import ast
+import itertools
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,12 +32,14 @@ SOLVER_FLOORS = (
 )
 ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))
 BLENDER_FLOORS = (
+    ("kinds",),
     ("compat", "native_files", "preferences"),
     ("store",),
     ("keys",),
     ("heat_map",),
     ("bake",),
     ("chains", "live_scrub", "properties"),
+    ("combinations", "exports"),
     ("operators",),
     ("ui",),
     ("cli",),
@@ -79,7 +83,7 @@ def upward_imports(source: str, module: str, is_package: bool = False) -> list[s
             found.append(name)
         for house, floors in HOUSES.items():
             own, other = _room(module, house), _room(name, house)
-            if None in (own, other) or own == other or (own, other) in LATE:
+            if own is None or other is None or own == other or (own, other) in LATE:
                 continue
             if floor_of(floors, own) <= floor_of(floors, other):
                 found.append(name)
@@ -196,3 +200,56 @@ print(count)
     run = subprocess.run([sys.executable, "-c", code], cwd=repository, capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 5
+
+
+def test_mypy_leaves_no_module_of_the_add_on_out(repository: Path) -> None:
+    settings = tomllib.loads((repository / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
+    assert settings["strict"]
+    assert PACKAGE in settings["files"]
+    assert "exclude" not in settings
+    for override in settings["overrides"]:
+        assert not override.keys() & {"follow_imports", "ignore_errors"}, override
+        ignored = override.get("ignore_missing_imports", False)
+        assert not (ignored and {name.split(".")[0] for name in override["module"]} & {PACKAGE, *BLENDER_MODULES})
+
+
+def test_nothing_is_imported_from_the_stubs_at_run_time(repository: Path) -> None:
+    """Blender has no such module."""
+    found = []
+    for name, _, source in modules(repository):
+        tree = ast.parse(source)
+        unseen = {
+            inner
+            for node in ast.walk(tree)
+            if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+            for inner in itertools.chain.from_iterable(ast.walk(statement) for statement in node.body)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and "stub" in (node.module or "") and node not in unseen:
+                found.append(name)
+    assert found == []
+
+
+def test_every_property_of_blender_has_its_type_said_beside_it(repository: Path) -> None:
+    """Blender reads the properties of a class, mypy their types: the same names, of kinds that go together."""
+    kinds = {"StringProperty": "str", "IntProperty": "int", "BoolProperty": "bool", "FloatProperty": "float"}
+    count = 0
+    for name, _, source in modules(repository):
+        for kind in (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)):
+            for choice in kind.body:
+                if isinstance(choice, ast.If) and choice.orelse:
+                    types, properties = _annotations(choice.body), _annotations(choice.orelse)
+                    assert list(types) == list(properties), f"{name}.{kind.name}"
+                    for key, value in properties.items():
+                        expected = kinds.get(value.split("(")[0])
+                        assert expected in (None, types[key]), f"{name}.{kind.name}.{key}"
+                    count += len(properties)
+    assert count > 20
+
+
+def _annotations(statements: list[ast.stmt]) -> dict[str, str]:
+    return {
+        ast.unparse(statement.target): ast.unparse(statement.annotation)
+        for statement in statements
+        if isinstance(statement, ast.AnnAssign)
+    }

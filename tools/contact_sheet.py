@@ -94,6 +94,7 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     import bpy
 
     from qc3d_addon.blender.keys.chain_shapes import step_shapes
+    from qc3d_addon.blender.kinds import mesh_of
     from qc3d_addon.blender.store.mesh_data import triangles
     from qc3d_addon.blender.store.records import Record
 
@@ -106,23 +107,24 @@ def _read_blend(label: str, path: Path, name: str, through: tuple[str, ...]) -> 
     keys = getattr(obj and obj.data, "shape_keys", None)
     chains = [] if keys is None else Record.read(keys).chains
     chain = next((chain for chain in chains if chain.through == through), None)
-    if chain is None:
+    if obj is None or chain is None:
         raise InputError(f"{path} has no in-betweens of {' → '.join(through)} on an object {name!r}.")
     frames = step_shapes(obj, chain)
-    return Row(label, triangles(obj.data).astype(np.int64), np.array(chain.places), frames)
+    return Row(label, triangles(mesh_of(obj)).astype(np.int64), np.array(chain.places), frames)
 
 
 def _read_scenery(name: str) -> tuple[Floats, Ints]:
     """Vertices and triangles of a mesh in the .blend that was opened last, in world coordinates."""
     import bpy
 
+    from qc3d_addon.blender.kinds import mesh_of
     from qc3d_addon.blender.store.mesh_data import triangles
 
     if name not in bpy.data.objects:
         raise InputError(f"There is no object {name!r}.")
     obj = bpy.data.objects[name]
-    points = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
-    return points, triangles(obj.data).astype(np.int64)
+    points = np.array([obj.matrix_world @ vertex.co for vertex in mesh_of(obj).vertices])
+    return points, triangles(mesh_of(obj)).astype(np.int64)
 
 
 if __name__ == "__main__":

@@ -7,8 +7,17 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, TypeVar
 
 import bpy
+
+from .kinds import expect, keys_of, present
+
+if TYPE_CHECKING:
+    Animated = bpy.types.Object | bpy.types.Key
+    Curves = bpy.types.ActionChannelbagFCurves
+
+Handler = TypeVar("Handler", bound=Callable[..., object])
 
 
 @contextmanager
@@ -34,7 +43,13 @@ def unregister_command(handle: object) -> None:
     bpy.utils.unregister_cli_command(handle)
 
 
-def remove_handler(handlers: list[Callable[..., object]], handler: Callable[..., object]) -> None:
+def persistent(handler: Handler) -> Handler:
+    """Let a handler stay when another file is loaded."""
+    keep: Callable[[Handler], Handler] = bpy.app.handlers.persistent
+    return keep(handler)
+
+
+def remove_handler(handlers: list[Handler], handler: Handler) -> None:
     """Take a handler back, where it is still there: some scripts and add-ons remove those of others with their own."""
     if handler in handlers:
         handlers.remove(handler)
@@ -46,7 +61,7 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     A new driver comes with a generator modifier (up to 4.5) or with two Bézier keyframes from (0, 0) to (1, 1) (5.x);
     the Bézier curve turns 0.5 into 0.49999994. Without either the value passes through as it is.
     """
-    curve = owner.driver_add(data_path)
+    curve = expect(bpy.types.FCurve, owner.driver_add(data_path))
     while curve.modifiers:
         curve.modifiers.remove(curve.modifiers[0])
     while curve.keyframe_points:
@@ -59,44 +74,87 @@ def clear_shape_keys(obj: bpy.types.Object) -> None:
 
     Up to 4.5 Blender leaves their data block behind, without a mesh: who then reads a point of it crashes.
     """
-    number = obj.data.shape_keys.session_uid
+    number = keys_of(obj).session_uid
     obj.shape_key_clear()
     bpy.data.batch_remove([keys for keys in bpy.data.shape_keys if keys.session_uid == number])
 
 
-def find_fcurve(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve | None:
+def find_fcurve(owner: Animated, data_path: str) -> bpy.types.FCurve | None:
     """The F-curve that animates a property of ``owner`` in its active action, if there is one."""
     curves = _fcurves(owner)
     return None if curves is None else curves.find(data_path)
 
 
-def remove_fcurve(owner: bpy.types.ID, data_path: str) -> None:
+def is_animated(owner: Animated, data_path: str) -> bool:
+    """Whether a property of ``owner`` has keyframes: in its active action, or in a strip of the NLA that is on."""
+    if owner.animation_data is None:
+        return False
+    curve = find_fcurve(owner, data_path)
+    if curve is not None and len(curve.keyframe_points):
+        return True
+    for track in owner.animation_data.nla_tracks:
+        for strip in track.strips if not track.mute else ():
+            curves = _strip_fcurves(strip)
+            if not strip.mute and curves is not None and curves.find(data_path) is not None:
+                return True
+    return False
+
+
+def _strip_fcurves(strip: bpy.types.NlaStrip) -> Curves | None:
+    """The F-curves that a strip of the NLA plays."""
+    return None if strip.action is None else _curves_of(strip.action, strip)
+
+
+def remove_fcurve(owner: Animated, data_path: str) -> None:
     """Remove the F-curve of a property, and the action with it where it holds nothing else and nobody else uses it."""
-    curves = _fcurves(owner)
-    assert curves is not None
-    curves.remove(curves.find(data_path))
-    action = owner.animation_data.action
+    animation = _animation(owner)
+    action = present(animation.action)
+    curves = _without(owner, data_path)
     if not len(curves) and action.users == 1 and not action.use_fake_user:
-        owner.animation_data.action = None
+        animation.action = None
         bpy.data.actions.remove(action)
 
 
-def _fcurves(owner: bpy.types.ID) -> bpy.types.bpy_prop_collection | None:
+def _animation(owner: Animated) -> bpy.types.AnimData:
+    return present(owner.animation_data)
+
+
+def _without(owner: Animated, data_path: str) -> Curves:
+    """Remove the F-curve of a property; those that are left."""
+    curves, curve = _fcurves(owner), find_fcurve(owner, data_path)
+    assert curves is not None
+    assert curve is not None
+    curves.remove(curve)
+    return curves
+
+
+def _fcurves(owner: Animated) -> Curves | None:
     """The F-curves of ``owner`` in its active action."""
     animation = owner.animation_data
-    if animation is None or animation.action is None:
-        return None
-    if not hasattr(animation, "action_slot"):  # before 4.4 an action holds its curves itself
-        return animation.action.fcurves
-    if animation.action_slot is None:
+    return None if animation is None or animation.action is None else _curves_of(animation.action, animation)
+
+
+def _curves_of(action: bpy.types.Action, player: bpy.types.AnimData | bpy.types.NlaStrip) -> Curves | None:
+    """The F-curves of an action in the slot that ``player`` plays."""
+    if not hasattr(player, "action_slot"):  # before 4.4 an action holds its curves itself
+        return _curves_of_old(action)
+    if player.action_slot is None:
         return None
     from bpy_extras import anim_utils
 
-    channels = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    # The stubs say that it returns nothing.
+    channels_of: Callable[..., bpy.types.ActionChannelbag | None] = anim_utils.action_get_channelbag_for_slot
+    channels = channels_of(action, player.action_slot)
     return None if channels is None else channels.fcurves
 
 
-def ensure_fcurve(owner: bpy.types.ID, data_path: str, undo: ExitStack) -> bpy.types.FCurve:
+def _curves_of_old(action: bpy.types.Action) -> Curves:
+    """The F-curves that an action before 4.4 holds itself."""
+    curves: Curves = getattr(action, "fcurves")  # noqa: B009 - 5.x does not know it
+    return curves
+
+
+def ensure_fcurve(owner: Animated, data_path: str, undo: ExitStack) -> bpy.types.FCurve:
     """The F-curve of a property, with the action (and slot) made where there is none.
 
     Closing ``undo`` takes back what was made.
@@ -107,23 +165,25 @@ def ensure_fcurve(owner: bpy.types.ID, data_path: str, undo: ExitStack) -> bpy.t
     if owner.animation_data is None:
         owner.animation_data_create()
         undo.callback(owner.animation_data_clear)
-    animation = owner.animation_data
+    animation = _animation(owner)
     if animation.action is None:
-        animation.action = bpy.data.actions.new(f"{owner.name}Action")
-        undo.callback(bpy.data.actions.remove, animation.action)
+        action = bpy.data.actions.new(f"{owner.name}Action")
+        animation.action = action
+        undo.callback(bpy.data.actions.remove, action)
     if hasattr(animation, "action_slot"):
         undo.callback(_take_back_slots, owner, animation.action_slot, set(animation.action.slots))
         curve = animation.action.fcurve_ensure_for_datablock(owner, data_path)
     else:
-        curve = animation.action.fcurves.new(data_path)
-    undo.callback(lambda: _fcurves(owner).remove(find_fcurve(owner, data_path)))
+        curve = _curves_of_old(animation.action).new(data_path)
+    undo.callback(_without, owner, data_path)
     return curve
 
 
 def _take_back_slots(
-    owner: bpy.types.ID, chosen: bpy.types.ActionSlot | None, before: set[bpy.types.ActionSlot]
+    owner: Animated, chosen: bpy.types.ActionSlot | None, before: set[bpy.types.ActionSlot]
 ) -> None:
-    animation = owner.animation_data
-    for slot in [slot for slot in animation.action.slots if slot not in before]:
-        animation.action.slots.remove(slot)
+    animation = _animation(owner)
+    slots = present(animation.action).slots
+    for slot in [slot for slot in slots if slot not in before]:
+        slots.remove(slot)
     animation.action_slot = chosen

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import bmesh
 import bpy
-from bpy.app.handlers import persistent
 
 from ..solver.errors import InputError
 from . import compat
 from .keys import chain_keys, shape_keys
+from .kinds import keys_of, mesh_of, shape_keys_of
 from .store.mesh_data import key_coordinates, set_key_coordinates
 from .store.records import Chain, Record
 
@@ -49,8 +49,9 @@ _suspended: _Scrub | None = None  # while the file is saved
 
 def is_on(obj: bpy.types.Object | None, slider_name: str = "") -> bool:
     """Whether the preview is on for an object, and for that slider where one is named."""
-    on_object = _scrub is not None and obj is not None and _scrub.plan.object_id == obj.session_uid
-    return on_object and (not slider_name or _scrub.chain.slider == slider_name)  # type: ignore[union-attr]
+    if _scrub is None or obj is None or _scrub.plan.object_id != obj.session_uid:
+        return False
+    return not slider_name or _scrub.chain.slider == slider_name
 
 
 def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
@@ -63,7 +64,7 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
     """
     obj = plan.find_object()
     chain_keys.control_of(obj, chain).require()
-    chain_keys.restart_drivers(obj.data.shape_keys, chain)
+    chain_keys.restart_drivers(keys_of(obj), chain)
     end()
     _show(obj, _Scrub(plan, chain, chain.weights, curve))
 
@@ -82,7 +83,7 @@ def _show_again(scrub: _Scrub) -> None:
     """Show it where the object is there, is not being edited, and has the keys that the curve was made from."""
     with contextlib.suppress(InputError):
         obj = scrub.plan.find_object()
-        chain = Record.read(obj.data.shape_keys).chain_of_slider(scrub.chain.slider)
+        chain = Record.read(keys_of(obj)).chain_of_slider(scrub.chain.slider)
         if chain is not None:  # undo may have brought back another number of steps
             _show(obj, replace(scrub, chain=chain, weights=chain.weights))
 
@@ -91,7 +92,7 @@ def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
     global _scrub
     try:
         key = obj.shape_key_add(name=KEY, from_mix=False)
-        key.relative_key = obj.data.shape_keys.reference_key
+        key.relative_key = keys_of(obj).reference_key
         key.value = 1.0
         scrub.place = None
         _scrub = scrub
@@ -104,16 +105,16 @@ def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
 def _follow(scrub: _Scrub) -> None:
     """Set the key to where the slider is, or end where the object is gone, was edited, or has lost key or slider."""
     obj = scrub.plan.locate()
-    keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
+    keys = None if obj is None or obj.type != 'MESH' else shape_keys_of(obj)
     key = None if keys is None else keys.key_blocks.get(KEY)
-    if key is None:
+    if obj is None or keys is None or key is None:
         end()
         return
-    if obj.data.is_editmode:
+    if mesh_of(obj).is_editmode:
         scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
         return
     control = chain_keys.control_of(obj, scrub.chain)
-    is_whole = len(obj.data.vertices) == len(key.points) == scrub.curve.vertices
+    is_whole = len(mesh_of(obj).vertices) == len(key.points) == scrub.curve.vertices
     if scrub.was_edited or obj.mode != 'OBJECT' or not is_whole or control.problem is not None:
         end()
         return
@@ -126,32 +127,37 @@ def _follow(scrub: _Scrub) -> None:
 
 
 def _has_key(mesh: bpy.types.Mesh) -> bool:
-    in_layers = mesh.is_editmode and KEY in bmesh.from_edit_mesh(mesh).verts.layers.shape
-    return in_layers or KEY in mesh.shape_keys.key_blocks
+    in_layers = mesh.is_editmode and bmesh.from_edit_mesh(mesh).verts.layers.shape.get(KEY) is not None
+    return in_layers or _block(mesh) is not None
+
+
+def _block(mesh: bpy.types.Mesh) -> bpy.types.ShapeKey | None:
+    keys = mesh.shape_keys
+    return None if keys is None else keys.key_blocks.get(KEY)
 
 
 def _remove_key(mesh: bpy.types.Mesh) -> None:
-    obj = next((obj for obj in bpy.data.objects if obj.data == mesh), None)
-    is_unused = obj is None
-    if is_unused:  # only an object can remove a key
-        obj = bpy.data.objects.new(KEY, mesh)
+    found = next((obj for obj in bpy.data.objects if obj.data == mesh), None)
+    obj = bpy.data.objects.new(KEY, mesh) if found is None else found  # only an object can remove a key
     if mesh.is_editmode:  # leaving Edit Mode would make the key again from its layer
         layers = bmesh.from_edit_mesh(mesh).verts.layers.shape
-        if KEY in layers:
-            layers.remove(layers[KEY])
-    if KEY in mesh.shape_keys.key_blocks:
-        shape_keys.remove_key(obj, mesh.shape_keys.key_blocks[KEY])
-    if is_unused:
+        layer = layers.get(KEY)
+        if layer is not None:
+            layers.remove(layer)
+    key = _block(mesh)
+    if key is not None:
+        shape_keys.remove_key(obj, key)
+    if found is None:
         bpy.data.objects.remove(obj)
 
 
-@persistent
+@compat.persistent
 def _on_update(*_: object) -> None:
     if _scrub is not None:
         _follow(_scrub)
 
 
-@persistent
+@compat.persistent
 def _after_undo(*_: object) -> None:
     """What was undone may have been made with or without the preview: it stays on while the keys are the same."""
     scrub = _scrub
@@ -160,14 +166,14 @@ def _after_undo(*_: object) -> None:
         _show_again(scrub)
 
 
-@persistent
+@compat.persistent
 def _before_save(*_: object) -> None:
     global _suspended
     _suspended = _scrub
     end()
 
 
-@persistent
+@compat.persistent
 def _after_save(*_: object) -> None:
     global _suspended
     scrub, _suspended = _suspended, None
@@ -175,24 +181,24 @@ def _after_save(*_: object) -> None:
         _show_again(scrub)
 
 
-@persistent
+@compat.persistent
 def _before_render(*_: object) -> None:
     _mute(True)
 
 
-@persistent
+@compat.persistent
 def _after_render(*_: object) -> None:
     _mute(False)
 
 
-@persistent
+@compat.persistent
 def _after_load(*_: object) -> None:
     end()
 
 
 def _mute(state: bool) -> None:
     obj = None if _scrub is None else _scrub.plan.locate()
-    keys = None if obj is None or obj.type != 'MESH' else obj.data.shape_keys
+    keys = None if obj is None or obj.type != 'MESH' else shape_keys_of(obj)
     if keys is not None and KEY in keys.key_blocks:
         keys.key_blocks[KEY].mute = state
 

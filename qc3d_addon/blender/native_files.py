@@ -54,11 +54,11 @@ def _end_of_pieces(file: BinaryIO, size: int) -> int:
     file.seek(max(size - _TABLE_END.size, 0))
     count, flags, magic = _TABLE_END.unpack(file.read())
     entry = struct.Struct("<III" if flags & 0x80 else "<II")  # bytes compressed and not, and perhaps a checksum
-    table = entry.size * count + _TABLE_END.size
+    table: int = entry.size * count + _TABLE_END.size
     if magic != _TABLE_MAGIC or table > size:
         return -1
     file.seek(size - table)
-    pieces = sum(values[0] for values in entry.iter_unpack(file.read(entry.size * count)))
+    pieces: int = sum(values[0] for values in entry.iter_unpack(file.read(entry.size * count)))
     return pieces + _HEADER_OF_TABLE + table
 
 
@@ -72,7 +72,8 @@ def _end_of_blocks(file: BinaryIO, start: bytes, size: int) -> int:
         code, *values = block.unpack(file.read(block.size))
         if not code[:2].isalnum():
             break
-        at += block.size + values[2 if is_large else 0]
+        length: int = values[2 if is_large else 0]
+        at += block.size + length
         if code == b"ENDB":
             return at
     return -1

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import IntProperty
 
+from .kinds import present
+
 if TYPE_CHECKING:
     from ..worker.client import Limits
 
@@ -21,24 +23,28 @@ class QC3DPreferences(bpy.types.AddonPreferences):
 
     bl_idname = _PACKAGE
 
-    time_limit: IntProperty(
-        name="Time Limit",
-        description="Minutes after which a bake is stopped",
-        default=_MINUTES,
-        min=1,
-        max=10_000,
-    )
-    memory_limit: IntProperty(
-        name="Memory Limit",
-        description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more is "
-        "not started, and on Linux stopped",
-        default=0,
-        min=0,
-        max=10_000_000,
-    )
+    if TYPE_CHECKING:
+        time_limit: int
+        memory_limit: int
+    else:
+        time_limit: IntProperty(
+            name="Time Limit",
+            description="Minutes after which a bake is stopped",
+            default=_MINUTES,
+            min=1,
+            max=10_000,
+        )
+        memory_limit: IntProperty(
+            name="Memory Limit",
+            description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more "
+            "is not started, and on Linux stopped",
+            default=0,
+            min=0,
+            max=10_000_000,
+        )
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
+        layout = present(self.layout)
         layout.use_property_split = True
         layout.prop(self, "time_limit", text="Time Limit (Minutes)")
         layout.prop(self, "memory_limit", text="Memory Limit (MB)")
@@ -49,7 +55,8 @@ def limits(context: bpy.types.Context) -> "Limits":
     from ..solver.support.memory import machine_limit_mb
     from ..worker.client import Limits
 
-    addon = context.preferences.addons.get(_PACKAGE)
+    preferences = context.preferences
+    addon = None if preferences is None else preferences.addons.get(_PACKAGE)
     chosen = None if addon is None else addon.preferences
     minutes = _MINUTES if chosen is None else chosen.time_limit
     memory = 0 if chosen is None else chosen.memory_limit

@@ -6,16 +6,27 @@
 
 import contextlib
 from dataclasses import fields
-from typing import get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
-from ..solver.settings import FitOptions, FrameOptions, PlayOptions
-from .bake.request import BakeRequest
+from ..solver.settings import (
+    Easing,
+    Engine,
+    FitOptions,
+    FrameOptions,
+    Mode,
+    PlayOptions,
+    Quality,
+    StretchLaw,
+    WeightKind,
+)
+from .bake.request import BakeRequest, PlayOn
 from .heat_map import heat_map
 from .heat_map.colors import MEASURE_ITEMS
+from .kinds import expect, keys_of
 from .store import checks
 from .store.names import MAX_STEPS
 from .store.records import Record
@@ -52,11 +63,11 @@ _DESCRIPTIONS = {
     },
 }
 _OPTIONS = (FitOptions, FrameOptions, PlayOptions)
-_DEFAULTS = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
+_DEFAULTS: dict[str, Any] = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
 _KINDS = {name: hint for kind in _OPTIONS for name, hint in get_type_hints(kind).items()}
 
 
-def _choice(setting: str, description: str) -> object:
+def _choice(setting: str, description: str) -> Any:  # noqa: ANN401 - what it is only Blender knows
     """A menu of what one of the solver's settings may be."""
     texts = _DESCRIPTIONS[setting]
     return EnumProperty(
@@ -75,108 +86,134 @@ class InnerKey(bpy.types.PropertyGroup):
 class MapChoices:
     """The keys, and everything that the maps between them depend on."""
 
-    from_key: StringProperty(name="From", description="The shape key to start from", options={'SKIP_SAVE'})
-    via: CollectionProperty(
-        name="Through",
-        description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
-        type=InnerKey,
-        options={'SKIP_SAVE'},
-    )
-    to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
-    stretch: _choice("stretch", "How the mode natural interpolates stretches")
-    extra_turns: IntProperty(
-        name="Extra Turns",
-        description="Full turns, between every two keys, that two shapes cannot tell",
-        default=_DEFAULTS["extra_turns"],
-        min=-100,
-        max=100,
-        soft_min=-5,
-        soft_max=5,
-        options={'SKIP_SAVE'},
-    )
-    engine: _choice("engine", "What fills the volume around the mesh")
-    quality: _choice("quality", "How fine the volume is")
-    seed: IntProperty(
-        name="Seed",
-        description="Of the samples that the volume is made from",
-        default=_DEFAULTS["seed"],
-        min=0,
-        options={'SKIP_SAVE'},
-    )
+    if TYPE_CHECKING:
+        from_key: str
+        via: "bpy.types.bpy_prop_collection_idprop[InnerKey]"
+        to_key: str
+        stretch: StretchLaw
+        extra_turns: int
+        engine: Engine
+        quality: Quality
+        seed: int
+    else:
+        from_key: StringProperty(
+            name="From", description="The shape key to start from", options={'SKIP_SAVE'}
+        )
+        via: CollectionProperty(
+            name="Through",
+            description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
+            type=InnerKey,
+            options={'SKIP_SAVE'},
+        )
+        to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
+        stretch: _choice("stretch", "How the mode natural interpolates stretches")
+        extra_turns: IntProperty(
+            name="Extra Turns",
+            description="Full turns, between every two keys, that two shapes cannot tell",
+            default=_DEFAULTS["extra_turns"],
+            min=-100,
+            max=100,
+            soft_min=-5,
+            soft_max=5,
+            options={'SKIP_SAVE'},
+        )
+        engine: _choice("engine", "What fills the volume around the mesh")
+        quality: _choice("quality", "How fine the volume is")
+        seed: IntProperty(
+            name="Seed",
+            description="Of the samples that the volume is made from",
+            default=_DEFAULTS["seed"],
+            min=0,
+            options={'SKIP_SAVE'},
+        )
 
 
 class BakeChoices(MapChoices):
     """The keys, and the in-betweens to make between them."""
 
-    count: IntProperty(
-        name="In-Betweens",
-        description="Number of in-betweens between every two keys, evenly spaced",
-        default=5,
-        min=1,
-        max=MAX_STEPS - 1,
-        soft_max=20,
-        options={'SKIP_SAVE'},
-    )
-    use_tolerance: BoolProperty(
-        name="As Few as Needed",
-        description="Make as few in-betweens as stay within a tolerance, where they help, instead of a fixed number",
-        default=False,
-        options={'SKIP_SAVE'},
-    )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="How far a vertex may be from where it should be, at any position of the slider; "
-        "a length in the object's own units, before its scale",
-        default=0.001,
-        min=1e-6,
-        soft_max=1.0,
-        precision=4,
-        step=0.01,
-        subtype='DISTANCE',
-        unit='LENGTH',
-        options={'SKIP_SAVE'},
-    )
-    weights: _choice("weights", "What is played between the in-betweens")
-    colliders: StringProperty(
-        name="Keep Off",
-        description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
-        options={'SKIP_SAVE'},
-    )
-    play_on: EnumProperty(
-        name="Play On",
-        description="What plays the in-betweens",
-        items=[
-            ("auto", "Auto", "The last key's own value where it can be, else a slider"),
-            ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
-            ("slider", "Slider", "A slider of their own, a custom property of the object"),
-        ],
-        default="auto",
-        options={'SKIP_SAVE'},
-    )
-    mode: _choice("mode", "How the map between the keys is interpolated")
-    easing: _choice("easing", "How the speed from the first key to the last changes")
-    use_keyframes: BoolProperty(
-        name="Keyframes",
-        description="Animate the slider from the first key to the last",
-        default=False,
-        options={'SKIP_SAVE'},
-    )
-    frame_start: IntProperty(
-        name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
-    )
-    frame_end: IntProperty(
-        name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
-    )
+    if TYPE_CHECKING:
+        count: int
+        use_tolerance: bool
+        tolerance: float
+        weights: WeightKind
+        colliders: str
+        play_on: PlayOn
+        mode: Mode
+        easing: Easing
+        use_keyframes: bool
+        frame_start: int
+        frame_end: int
+    else:
+        count: IntProperty(
+            name="In-Betweens",
+            description="Number of in-betweens between every two keys, evenly spaced",
+            default=5,
+            min=1,
+            max=MAX_STEPS - 1,
+            soft_max=20,
+            options={'SKIP_SAVE'},
+        )
+        use_tolerance: BoolProperty(
+            name="As Few as Needed",
+            description="Make as few in-betweens as stay within a tolerance, where they help, "
+            "instead of a fixed number",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
+        tolerance: FloatProperty(
+            name="Tolerance",
+            description="How far a vertex may be from where it should be, at any position of the slider; "
+            "a length in the object's own units, before its scale",
+            default=0.001,
+            min=1e-6,
+            soft_max=1.0,
+            precision=4,
+            step=0.01,
+            subtype='DISTANCE',
+            unit='LENGTH',
+            options={'SKIP_SAVE'},
+        )
+        weights: _choice("weights", "What is played between the in-betweens")
+        colliders: StringProperty(
+            name="Keep Off",
+            description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
+            options={'SKIP_SAVE'},
+        )
+        play_on: EnumProperty(
+            name="Play On",
+            description="What plays the in-betweens",
+            items=[
+                ("auto", "Auto", "The last key's own value where it can be, else a slider"),
+                ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
+                ("slider", "Slider", "A slider of their own, a custom property of the object"),
+            ],
+            default="auto",
+            options={'SKIP_SAVE'},
+        )
+        mode: _choice("mode", "How the map between the keys is interpolated")
+        easing: _choice("easing", "How the speed from the first key to the last changes")
+        use_keyframes: BoolProperty(
+            name="Keyframes",
+            description="Animate the slider from the first key to the last",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
+        frame_start: IntProperty(
+            name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
+        )
+        frame_end: IntProperty(
+            name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
+        )
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
     """Let a heat map that is on show the measure that was chosen; where it cannot, its button says why."""
-    obj = settings.id_data
+    obj = expect(bpy.types.Object, settings.id_data)
     state = heat_map.shown(obj)
     if state is None or state.measure == settings.measure or checks.object_problem(obj) is not None:
         return
     with contextlib.suppress(InputError):
-        chain = Record.read(obj.data.shape_keys).chain_of_slider(state.slider)
+        chain = Record.read(keys_of(obj)).chain_of_slider(state.slider)
         if chain is not None:
             heat_map.show(obj, chain, settings.measure)
 
@@ -184,9 +221,21 @@ def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> Non
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object."""
 
-    measure: EnumProperty(
-        name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
-    )
+    if TYPE_CHECKING:
+        measure: str
+    else:
+        measure: EnumProperty(
+            name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
+        )
+
+
+SETTINGS = "qc3d"  # the attribute of an object that has them
+
+
+def settings_of(obj: bpy.types.Object) -> ObjectSettings:
+    """The panel's choices for an object."""
+    settings: ObjectSettings = getattr(obj, SETTINGS)
+    return settings
 
 
 # Functions, not methods of the choices: the Python module of Blender 4.2 crashes at its end where a registered class

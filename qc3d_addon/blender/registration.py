@@ -4,29 +4,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 
 from ..worker import engines
 from . import cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
+from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
     QC3D_OT_export_alembic,
     QC3D_OT_mirror,
+    QC3D_OT_play_on_key,
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
+from .operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, QC3D_OT_remove_combination
+from .operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
-from .ui import menus, panel_results, panels, presets
+from .operators.split_key import QC3D_OT_split_key
+from .ui import menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
     properties.InnerKey,  # before what has it
@@ -36,16 +42,24 @@ CLASSES = (
     QC3D_OT_bake_inbetweens,
     KeyChoice,
     QC3D_OT_bake_keys,
+    QC3D_OT_bake_objects,
+    QC3D_OT_split_key,
     QC3D_OT_rebake,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
     QC3D_OT_select_worst,
     QC3D_OT_live_scrub,
     QC3D_OT_remove,
+    QC3D_OT_play_on_key,
     QC3D_OT_to_keyframes,
     QC3D_OT_absolute_keys,
     QC3D_OT_mirror,
     QC3D_OT_export_alembic,
+    QC3D_OT_export_in_betweens,
+    QC3D_OT_combine_keys,
+    QC3D_OT_judge_pairs,
+    QC3D_OT_remove_combination,
+    QC3D_OT_read_usd,
     QC3D_OT_save_map,
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
@@ -55,6 +69,8 @@ CLASSES = (
     presets.QC3D_OT_add_preset,
     panels.QC3D_PT_inbetweens,
     panel_results.QC3D_PT_results,  # after its parent
+    panel_combinations.QC3D_PT_combinations,
+    panel_exports.QC3D_PT_exports,
 )
 
 _commands: list[object] = []
@@ -64,7 +80,8 @@ def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.qc3d = bpy.props.PointerProperty(type=properties.ObjectSettings)
+    pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
+    setattr(bpy.types.Object, properties.SETTINGS, pointer(type=properties.ObjectSettings))
     jobs.register()
     menus.register()
     legend.register()
@@ -81,6 +98,6 @@ def unregister() -> None:
     menus.unregister()
     jobs.unregister()
     engines.forget()
-    del bpy.types.Object.qc3d
+    delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d analyze``: how much a mapping distorts, in figures, arrays and pictures."""
+"""``qc3d analyze``: the distortion of a map, in figures, arrays and pictures."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ if TYPE_CHECKING:
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the others."""
-    command = commands.add_parser("analyze", help="how much the map between two shapes, or of a mesh, distorts")
+    command = commands.add_parser("analyze", help="distortion of the map between two shapes, or of a map of a mesh")
     command.add_argument(
         "input",
         type=Path,
         metavar="FILE",
-        help="with --from and --to: shapes as for interpolate, whose map is fitted first; else tetrahedra with the "
-        "array 'target': .npz, .vtu, .vtk, .msh",
+        help="with --from and --to: shapes as for interpolate, whose map is fitted first; otherwise tetrahedra with "
+        "the array 'target': .npz, .vtu, .vtk, .msh",
     )
     command.add_argument("--from", dest="first", metavar="NAME", help="the first of two shapes")
-    command.add_argument("--to", dest="last", metavar="NAME", help="the second")
-    command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
+    command.add_argument("--to", dest="last", metavar="NAME", help="the second shape")
+    command.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with mapped vertices")
     command.add_argument("--format", choices=("npz", "vtu", "vtk", "msh"), default="npz", help="of mapping.* (npz)")
     command.add_argument(
         "--up", choices=("x", "y", "z"), default="z", help="the axis that points up in pictures of shapes (z)"
     )
-    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
+    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
     add_options(command, FitOptions)
     command.set_defaults(run=_run)
 
@@ -57,10 +57,10 @@ def _run(arguments: argparse.Namespace) -> None:
     fitted = None
     names = [f"mapping.{arguments.format}", "histograms.png", "slices.png", "summary.json"]
     if (arguments.first is None) != (arguments.last is None):
-        raise InputError("Two shapes are needed; give both --from and --to, or neither for a mesh of tetrahedra.")
+        raise InputError("Two shapes are needed; give both --from and --to, or neither for a tetrahedral mesh.")
     if arguments.first is not None:
         if arguments.target is not None:
-            raise InputError("--target belongs to meshes of tetrahedra; leave it out, or --from and --to.")
+            raise InputError("--target is for tetrahedral meshes only; leave it out, or leave out --from and --to.")
         names += ["surface.npz", "surface.png"]
     require_writable_in(arguments.output, names, [arguments.input, arguments.target])
     if arguments.first is not None:

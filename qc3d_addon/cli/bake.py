@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +40,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument("file", type=Path, metavar="FILE.blend", help="a file with a mesh that has two shape keys")
     objects = command.add_mutually_exclusive_group(required=True)
     objects.add_argument(
-        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; once for each"
+        "--object", dest="objects", action="append", default=[], metavar="NAME", help="a mesh object; repeat for more"
     )
-    objects.add_argument("--all-objects", action="store_true", help="every mesh with two shape keys or more")
+    objects.add_argument("--all-objects", action="store_true", help="all meshes with two or more shape keys")
+    command.add_argument(
+        "--together",
+        action="store_true",
+        help="bake the objects in one map, so that what coincides stays together; the first one's control drives all",
+    )
     add_way(command, "shape key", is_required=False)
     command.add_argument(
         "--on-key",
@@ -48,30 +55,38 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         action="append",
         default=[],
         metavar="KEY",
-        help="a shape key whose own value is to play in-betweens from what it is relative to; once for each",
+        help="a shape key whose own value will play in-betweens, from the key that it is relative to; repeat for more",
     )
-    command.add_argument("--all-keys", action="store_true", help="the same for every shape key that needs it")
+    command.add_argument(
+        "--combine",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="KEY",
+        help="two shape keys or three that are on at once, to be corrected; once for each, after everything else",
+    )
+    command.add_argument("--all-keys", action="store_true", help="like --on-key for all shape keys that need it")
     amount = command.add_mutually_exclusive_group()
     amount.add_argument("--frames", type=frame_count, metavar="N", help="number of in-betweens between every two keys")
     amount.add_argument(
-        "--tolerance", type=float, metavar="T", help="as few in-betweens as play the motion within this distance"
+        "--tolerance", type=float, metavar="T", help="as few in-betweens as keep the motion within this distance"
     )
-    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the file itself")
+    add_outputs(command, "OUT.blend", "the file with the in-betweens; may be the input file")
     command.add_argument(
         "--keyframes",
         type=whole_number,
         nargs=2,
         metavar=("FIRST", "LAST"),
-        help="animate what plays them over these frames",
+        help="animate the key or slider that plays the in-betweens over these frames",
     )
     command.add_argument(
         "--play-on",
         choices=("auto", "key", "slider"),
         default="auto",
-        help="what plays them: the last key's own value, or a slider of their own (default: the key where it can be)",
+        help="what plays the in-betweens: the last key's own value or a separate slider (default: the key if possible)",
     )
     command.add_argument(
-        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not touch"
+        "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not enter"
     )
     add_options(command, FrameOptions, FitOptions, PlayOptions)
     command.set_defaults(run=_run)
@@ -79,12 +94,17 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def _run(arguments: argparse.Namespace) -> None:
     try:
-        from ..blender.bake.run import bake_file, bake_object, bake_object_keys
+        from ..blender.bake.run import bake_file, bake_object, bake_object_keys, bake_objects_together
+        from ..blender.combinations.combine import combine, finished
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     ways = [bool(arguments.on_keys), arguments.all_keys, any((arguments.first, arguments.last, arguments.via))]
-    if sum(ways) != 1:
-        raise InputError("Name the keys in one way: --from and --to, --on-key, or --all-keys; see qc3d bake --help.")
+    if sum(ways) > 1 or not (sum(ways) or arguments.combine):
+        raise InputError(
+            "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
+        )
+    if arguments.together and not (ways[2] and not arguments.combine):
+        raise InputError("Objects are baked together from one key to another: name these by --from and --to.")
     request = _request(arguments, is_pair=ways[2])
     with StageBars() as bars:
 
@@ -99,11 +119,27 @@ def _run(arguments: argparse.Namespace) -> None:
             values = [{"key": one.key, "ended": one.ended, "text": one.text, "report": one.report} for one in verdicts]
             return [f"{obj.name}: {verdict}" for verdict in verdicts], {"keys": values}
 
-        work = bake_pair if ways[2] else bake_keys
+        def combine_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
+            said, values = (bake_pair if ways[2] else bake_keys)(obj) if any(ways) else ([], {})
+            for names in arguments.combine:
+                made = finished(combine(obj, names, options=fit_options(arguments)))
+                said.append(f"{obj.name}: {made.text}")
+                values = {**values, "combinations": [*values.get("combinations", []), asdict(made)]}
+            return said, values
+
+        def bake_one_by_one(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
+            one = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
+            return [one(obj) for obj in objects]
+
+        def bake_together(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
+            results = bake_objects_together(objects, request, on_progress=bars)
+            return [(list(result.notes), result.report) for result in results]
+
+        work = bake_together if arguments.together else bake_one_by_one
         told = bake_file(arguments.file, arguments.objects, work, arguments.output, arguments.report)
     sentences = [sentence for of_object in told for sentence in of_object]
     if ways[2]:
-        print_notes(sentences)
+        print_notes(dict.fromkeys(sentences))
     else:
         for sentence in sentences:
             speech.say(sentence)

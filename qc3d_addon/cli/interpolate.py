@@ -43,8 +43,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--mirror",
         choices=get_args(Mirror),
         default="auto",
-        help="axes across which the mesh is one half only; auto: where it is open on a plane through the origin "
-        "(default: auto)",
+        help="axes to mirror across, if the mesh is only one half; auto: those where it is open on a plane through the "
+        "origin (default: auto)",
     )
     add_options(command, FrameOptions, FitOptions)
     command.set_defaults(run=_run)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of landmarks, as people and spreadsheets write them."""
+"""Tables of landmarks, as written by people and by spreadsheets."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 def read_landmarks(path: Path) -> tuple[Ints, Floats]:
-    """Vertices (k,) and where they go (k, 3), NaN where a coordinate is free.
+    """Read a table of landmarks: vertices (k,) and their targets (k, 3), NaN where a coordinate is free.
 
-    The columns vertex, x, y and z may come in any order and in capitals. Cells are separated by commas, semicolons or
-    tabs; where they are not separated by commas, decimals may be. The text is UTF-8, or UTF-16 with its mark.
+    The columns vertex, x, y and z may be in any order and in capitals. Cells are separated by commas, semicolons or
+    tabs; except with commas, decimal commas are allowed. The encoding is UTF-8, or UTF-16 with a byte-order mark.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is no such table.
+        If the file cannot be read or is not such a table.
     """
     rows = _rows(path)
     header = [cell.strip().lower() for cell in rows[0][1]] if rows else []
@@ -46,7 +46,7 @@ def read_landmarks(path: Path) -> tuple[Ints, Floats]:
                 raise ValueError("four cells are needed")
             vertex, *places = (_number(row[place]) for place in order)
             if not vertex == round(vertex):
-                raise ValueError(f"{vertex} is no number of a vertex")
+                raise ValueError(f"{vertex} is not a vertex number")
         except (ValueError, OverflowError) as error:
             raise InputError(f"{path}, row {number}: {error}; correct the row.") from error
         vertices.append(round(vertex))

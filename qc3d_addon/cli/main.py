@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
-from . import analyze, bake, combine, compress, interpolate, reconstruct, reproduce, speech
+from . import analyze, bake, combine, compress, export, interpolate, reconstruct, reproduce, speech
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,8 +20,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns
     -------
-    0 when it is done; 1 when all files are written, but not what was to be said on standard output; 2 when it cannot be
-    done, with one sentence on standard error; 130 when interrupted.
+    int
+        0 after success; 1 if all files were written, but standard output could not be; 2 after an error, with one
+        sentence on standard error; 130 after an interruption.
     """
     problem = None
     try:
@@ -58,13 +59,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    for command in (interpolate, combine, bake, analyze, reconstruct, compress, reproduce):
+    for command in (interpolate, combine, bake, export, analyze, reconstruct, compress, reproduce):
         command.add_to(commands)
     return parser
 
 
 def _version() -> str:
-    """The version of the manifest that came with the code: inside the extension, above the package in a checkout."""
+    """The version in the manifest, which is inside an installed extension, or next to the package in a checkout."""
     package = Path(__file__).parent.parent
     for manifest in (package / "blender_manifest.toml", package.parent / "blender_manifest.toml"):
         if manifest.is_file():
@@ -73,9 +74,9 @@ def _version() -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one sentence; argparse alone would print the usage of the whole command before it.
+    """Reports errors in one sentence; argparse alone would first print the usage of the whole command.
 
-    An option that takes one value and comes twice is refused: argparse would silently drop the first.
+    A repeated option that takes a single value is refused; argparse would silently drop the first value.
     """
 
     def __init__(self, **choices: Any) -> None:  # noqa: ANN401 - whatever argparse takes

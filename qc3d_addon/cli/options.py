@@ -17,13 +17,13 @@ from . import speech
 MOST_FRAMES = 10_000
 _HELP = {
     "mode": "how in-betweens are made",
-    "easing": "how far along the way the in-betweens are",
-    "weights": "what is played between in-betweens",
-    "stretch": "how mode natural interpolates stretches",
-    "engine": "what fills the volume around the mesh",
-    "quality": "how fine the volume is",
-    "extra_turns": "full turns that two shapes cannot tell",
-    "seed": "of the delaunay engine's samples",
+    "easing": "how the speed of the motion changes",
+    "weights": "how in-betweens are blended while they are played",
+    "stretch": "how mode natural interpolates lengths",
+    "engine": "method that fills the volume around the mesh with tetrahedra",
+    "quality": "resolution of the volume around the mesh",
+    "extra_turns": "full turns to add to parts that can turn freely, which two shapes alone cannot tell",
+    "seed": "seed of the random samples of the engine delaunay",
 }
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
@@ -68,29 +68,29 @@ def add_keys(command: argparse.ArgumentParser, kind: str, output: str, contents:
 
 
 def add_way(command: argparse.ArgumentParser, kind: str, is_required: bool = True) -> None:
-    """Add the keys to go through."""
+    """Add the options for the keys that the motion goes through."""
     command.add_argument(
         "--from", dest="first", required=is_required, metavar="NAME", help=f"the {kind} to start from"
     )
     command.add_argument(
-        "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; once for each, in order"
+        "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; repeat for more, in order"
     )
     command.add_argument("--to", dest="last", required=is_required, metavar="NAME", help=f"the {kind} to end with")
 
 
 def add_outputs(command: argparse.ArgumentParser, output: str, contents: str) -> None:
-    """Add where results go."""
+    """Add the options for the output and the report."""
     command.add_argument("--output", type=Path, required=True, metavar=output, help=contents)
     command.add_argument("--report", type=Path, metavar="REPORT.json", help="engine, folds, residual, seconds, memory")
 
 
 def key_names(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """The keys of ``add_keys`` from the first to the last."""
+    """The keys of ``add_way`` from the first to the last."""
     return (arguments.first, *arguments.via, arguments.last)
 
 
 def output_files(arguments: argparse.Namespace) -> list[Path]:
-    """The output, and the report where one is asked for."""
+    """The output, and the report if one is asked for."""
     return [arguments.output, *([] if arguments.report is None else [arguments.report])]
 
 

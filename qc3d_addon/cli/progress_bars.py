@@ -19,9 +19,9 @@ _FORMAT = "{desc:8}{percentage:4.0f}% |{bar:40}| {elapsed}"
 
 
 class StageBars:
-    """Draws the progress that it is called with; silent where standard error is no terminal.
+    """Draws the progress that it is called with; silent unless standard error is a terminal.
 
-    Silent too inside Blender, whose own Python comes without tqdm.
+    Also silent inside Blender, whose own Python comes without tqdm.
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class StageBars:
             self._bar.close()
 
     def _finish_stage(self) -> None:
-        """A stage that is followed by another, or by the end, was done, whatever fraction it reported last."""
+        """Complete the bar: a stage is finished when another one starts, whatever fraction it reported last."""
         if self._bar is not None:
             self._bar.update(1.0 - self._bar.n)
             self._bar.close()

@@ -44,14 +44,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--boundary",
         choices=("sliding", "fixed", "free"),
         default="sliding",
-        help="the unit cube's faces slide; or the boundary is held where the array 'target' has it, or where it is "
-        "if there is none; or nothing but landmarks is held (default: sliding)",
+        help="sliding: the unit cube's faces slide within themselves; fixed: the boundary is fixed at the array "
+        "'target', or at its own place without one; free: only landmarks are fixed (default: sliding)",
     )
     command.add_argument(
         "--landmarks",
         type=Path,
         metavar="FILE.csv",
-        help="columns vertex, x, y, z: where vertices go; an empty cell leaves that coordinate free",
+        help="columns vertex, x, y, z: targets of vertices; an empty cell leaves that coordinate free",
     )
     command.add_argument(
         "--output", type=Path, required=True, metavar="OUT", help="the mesh with the array 'target'; .mesh: moved"
@@ -74,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> None:
     ratios = determinants(found.jacobians)
     moved = np.linalg.norm(found.values - mesh.points, axis=1).max()
     speech.say(
-        f"{len(mesh.tets)} tetrahedra rebuilt, {found.folds} folds; volume ratio {ratios.min():.3g} to "
+        f"{len(mesh.tets)} tetrahedra reconstructed, {found.folds} folds; volume ratio {ratios.min():.3g} to "
         f"{ratios.max():.3g}, vertices moved by up to {moved:.3g}; {arguments.output}"
     )
     if found.folds:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d reproduce``: the paper's experiments, drawn, measured, and held against what it claims."""
+"""``qc3d reproduce``: the paper's experiments, drawn, measured, and compared with its claims."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _TEXT = "figures.md"
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the others."""
-    command = commands.add_parser("reproduce", help="the experiments of the paper that the method is from")
+    command = commands.add_parser("reproduce", help="the experiments of the paper on which the method is based")
     command.add_argument(
-        "--figure", type=int, choices=NUMBERS, action="append", metavar="N", help="3 to 13; all where left out"
+        "--figure", type=int, choices=NUMBERS, action="append", metavar="N", help="3 to 13; repeatable (default: all)"
     )
     command.add_argument(
         "--data", type=Path, metavar="FOLDER", help="real shapes: head.npz and body.npz in place of the demo files"
     )
-    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made where it is not there")
+    command.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
     command.set_defaults(run=_run)
 
 
@@ -70,7 +70,7 @@ def _draw(number: int, data: Path | None, file: BinaryIO) -> Caption:
 
 
 def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:
-    """What a figure is called and the map it rebuilds: from a formula, or one fitted to real shapes."""
+    """Title of a figure, and the map that it reconstructs: from a formula, or fitted to real shapes."""
     from qc3d_paper.experiments import bijections, shapes
 
     if data is None:
@@ -90,7 +90,7 @@ def _cube() -> TetMesh:
 
 @cache
 def _experiment(which: int, data: Path | None) -> Experiment:
-    """The first map is mild, a face, the second extreme, a body."""
+    """The first experiment uses a mild map, of a face; the second an extreme one, of a body."""
     from qc3d_paper.experiments import shapes, spectra
 
     mild, extreme = (shapes.FACES, shapes.BODIES) if data is None else (shapes.DATA_FACES, shapes.DATA_BODIES)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the command says. That nobody can hear it any more is no reason to end the work."""
+"""Standard output and error of the command. If they break, the work goes on."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _unheard: OSError | None = None
 
 
 def open_streams() -> None:
-    """Open what is closed of standard input, output and error, so that no file of ours gets one of their numbers.
+    """Open standard input, output and error if they are closed, so that none of our files gets their descriptors.
 
-    What native code writes to standard output or error would end up in that file.
+    Otherwise, what native code writes to standard output or error would end up in that file.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
-            # The lowest number that is free, which is this one: those below it are open.
+            # The system uses the lowest free descriptor, which is this one: those below it are open.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             mode = "r" if name == "stdin" else "w"
@@ -44,13 +44,13 @@ def note(text: str) -> None:
 
 
 def flush() -> None:
-    """Write what is left for standard output, of others too."""
+    """Flush standard output, including what others wrote to it."""
     with _listening():
         sys.stdout.flush()
 
 
 def take_unheard() -> OSError | None:
-    """Why something that was said could not be written, or None; asked once."""
+    """The error if something could not be written to standard output, or None; resets it."""
     global _unheard
     error, _unheard = _unheard, None
     return error
@@ -67,7 +67,7 @@ def _listening() -> Iterator[None]:
 
 
 def _silence(stream: TextIO) -> None:
-    """Let nothing more come of a stream, such as the same error when Python ends."""
+    """Redirect a broken stream to nowhere, so that it does not raise the same error again when Python ends."""
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

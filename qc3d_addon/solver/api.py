@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The public door for scripts: arrays in, frames out. See docs/reference/python.md."""
+"""The public interface for scripts: arrays in, frames out. See docs/reference/python.md."""
 
 from __future__ import annotations
 
@@ -40,6 +40,7 @@ __all__ = [
     "QC3DError",
     "Verdict",
     "bake",
+    "bake_together",
     "combine",
     "fit",
     "judge_pairs",
@@ -53,7 +54,7 @@ _NAMES = ("first", "second")
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Two keys and the fold-free map that carries the first onto the second: made once, asked for frames often.
+    """Two keys and the fold-free map between them: fitted once, then asked for frames as often as needed.
 
     Parameters
     ----------
@@ -64,17 +65,17 @@ class Fit:
 
     @property
     def mapping(self) -> Mapping:
-        """The map of the unit cube: mesh, images of its vertices, Jacobians, representation."""
+        """The fitted map of the unit cube, with its mesh, Jacobians and representation."""
         return Mapping(self.fitted.mesh, self.fitted.mapped)
 
     @property
     def residual(self) -> Residual:
-        """How far the map leaves vertices from the second key; in-betweens meet both keys all the same."""
+        """How far the map's landmarks are from the second key; in-betweens meet both keys all the same."""
         return self.fitted.landmark_residual()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences for the user, such as why another engine did the work."""
+        """Sentences for the user, such as why another engine was used."""
         return self.fitted.notes
 
     def inbetweens(
@@ -91,13 +92,13 @@ class Fit:
         Parameters
         ----------
         frames : int or (k,)
-            The number of in-betweens, evenly spaced, the keys at both ends beside them; or times in 0..1.
+            Number of evenly spaced in-betweens, to which the two keys are added; or times in 0..1.
         mode, easing
             See ``FrameOptions``.
         colliders : sequence of Collider
-            What the frames must not touch.
+            Surfaces that the frames must not enter.
         progress : callable
-            Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
+            Called with a ``Progress`` from time to time. An exception that it raises stops the work and is passed on.
 
         Returns
         -------
@@ -138,7 +139,7 @@ def fit(
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Fit:
-    """Fit the fold-free map that carries one key onto another: the slow part, done once.
+    """Fit the fold-free map from one key to another: the slow part, done once.
 
     Parameters
     ----------
@@ -147,12 +148,13 @@ def fit(
     faces : (m, 3)
         Triangles.
     edges : (e, 2), optional
-        Edges to keep together that belong to no triangle.
+        Edges that belong to no triangle and keep their length.
     polygons : (m,), optional
-        The polygon of each triangle; without it, two triangles that make a flat quad in all keys are one.
-    mirror
-        ``auto``: a mesh that is open on a plane through the origin, in all keys, is one half and moves with its mirror
-        image; its seam stays shut. ``none``, or the axes to mirror across, such as ``x`` or ``xy``.
+        The polygon of each triangle; by default, two triangles that form a flat quad in all keys are one polygon.
+    mirror : Mirror
+        ``auto``: a mesh that is open on a plane through the origin in all keys counts as one half; it moves with its
+        mirror image, and its seam stays closed. Otherwise ``none``, or the axes to mirror across, such as ``x`` or
+        ``xy``.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -190,7 +192,7 @@ def load_fit(
 ) -> Fit:
     """Read a fit of these keys from a file that ``Fit.save`` or Blender's *Save Map* wrote.
 
-    All but the path as for ``fit``.
+    All other parameters are those of ``fit``.
 
     Raises
     ------
@@ -222,21 +224,21 @@ def bake(
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Bake:
-    """Frames through two keys or more in one call, without a stop at the keys between.
+    """Compute frames through two or more keys in one call, without a stop at the inner keys.
 
     Parameters
     ----------
     keys : sequence of (n, 3)
-        Shapes of one mesh, from the first to the last; the same array may come again.
+        Shapes of one mesh, from the first to the last; the same array may be repeated.
     faces, edges, polygons, mirror
         See ``fit``.
     frames : int or (k,)
-        The number of in-betweens between every two keys, the keys themselves beside them; or times, 0 the first key
-        and 1 the last.
+        Number of in-betweens between every two keys, to which the keys are added; or times, from 0 at the first key to
+        1 at the last.
     mode, easing
         See ``FrameOptions``.
     colliders : sequence of Collider
-        What the frames must not touch.
+        Surfaces that the frames must not enter.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -281,7 +283,7 @@ def combine(
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Combination:
-    """The shape with several keys of one base on at once.
+    """Combine several keys of one base into the shape that they should make together.
 
     Parameters
     ----------
@@ -292,10 +294,10 @@ def combine(
     faces, edges
         See ``fit``.
     weights : sequence of float, optional
-        How much each key is on, 0..1; all fully where none are given. One that is partly on takes a fit.
+        Weight of each key, 0..1; all 1 by default. Each weight between 0 and 1 needs a fit.
     order : sequence of int, optional
-        Numbers of the keys, the outermost first: a key's motion happens inside those before it. Where it is not given
-        it is found: the outer of two keys is the one that turns more where the other bends.
+        Indices of the keys, outermost first: the motion of a key happens inside those before it. By default, the outer
+        of two keys is the one that turns more where the other bends.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -304,8 +306,8 @@ def combine(
     Raises
     ------
     QC3DError
-        If the keys, weights, order or options cannot be used, the volume of a key that is partly on cannot be filled,
-        or memory would not do.
+        If the keys, weights, order or options cannot be used, if the volume of a key with a weight between 0 and 1
+        cannot be filled, or if memory would not be enough.
     """
     return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
 
@@ -318,14 +320,14 @@ def judge_pairs(
     *,
     pairs: Sequence[tuple[int, int]] | None = None,
 ) -> Iterator[Verdict]:
-    """For every two keys of one base, one after the other: is their sum right, or does it need a combination?
+    """Yield, for each pair of keys of one base, a verdict: is their sum right, or do they need a combination?
 
     Parameters
     ----------
     base, keys, faces, edges
         See ``combine``.
     pairs : sequence of (int, int), optional
-        Numbers of the keys, where not every two are asked for.
+        Indices of the keys of the pairs to judge; all pairs by default.
 
     Raises
     ------
@@ -333,3 +335,43 @@ def judge_pairs(
         If the keys cannot be used.
     """
     return verdicts(KeysOnBase(base, keys, faces, edges), pairs)
+
+
+def bake_together(
+    meshes: Sequence[tuple[Sequence[ArrayLike], ArrayLike]],
+    frames: int | ArrayLike = 5,
+    *,
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    progress: OnProgress | None = None,
+    **options: Unpack[FitChoices],
+) -> list[Bake]:
+    """Frames of several meshes of one character in one map: what coincides in all keys stays together.
+
+    Parameters
+    ----------
+    meshes : sequence of (keys, faces)
+        Of each mesh its keys, (n, 3) each and equally many for all, in coordinates that all share, and its triangles.
+    frames, mode, easing, progress, **options
+        See ``bake``.
+
+    Returns
+    -------
+    list of Bake
+        Of each mesh. Notes, crossings and folds are those of all together.
+
+    Raises
+    ------
+    QC3DError
+        As ``bake``.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> bakes = qc3d.bake_together([([corners, 2.0 * corners], faces), ([-corners, corners], faces[:1])], frames=1)
+    >>> [bake.frames.shape for bake in bakes]
+    [(3, 4, 3), (3, 4, 3)]
+    """
+    return steps.bake_together(meshes, frames, mode=mode, easing=easing, **options).run(progress)

@@ -79,7 +79,7 @@ class FitOptions:
 
     @property
     def identity(self) -> str:
-        """The options as one text: fits with the same text can take each other's place."""
+        """The options as one string; fits with the same string are interchangeable."""
         return f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
 
 
@@ -96,7 +96,7 @@ class FitChoices(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class FrameOptions:
-    """How frames are made from a fit; other frames of the same fit may use others.
+    """Options of frames; different frames of the same fit may use different ones.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class FrameOptions:
         ``natural`` keeps rotations, lengths and volumes, ``linear`` is the paper's scheme (Chen & Lui, section 6.1),
         ``straight`` moves every vertex along a straight line and needs no fit.
     easing
-        How far along the way the in-betweens are: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
+        How the speed of the motion changes: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
 
     Raises
     ------
@@ -126,19 +126,19 @@ class FrameOptions:
 
 @dataclass(frozen=True)
 class PlayOptions:
-    """How a control is to play a motion through a few of its shapes.
+    """How a control plays a motion through a few of its shapes.
 
     Parameters
     ----------
-    count
-        Number of in-betweens between every two keys, even in the control's position; 1 or more.
-    tolerance
-        Where positive, as few in-betweens as play every moment within this distance, in the keys' unit, wherever they
-        help; ``count`` is then not looked at.
-    weights
+    count : int
+        Number of in-betweens between every two keys, evenly spaced in the control's position.
+    tolerance : float
+        If positive, as few in-betweens as play every moment within this distance, in the keys' unit, placed where they
+        help most; ``count`` is then ignored.
+    weights : WeightKind
         ``smooth``: a smooth path through the shapes; ``hats``: straight blends between neighbors.
-    also_at
-        Positions of more in-betweens, each between 0 and 1.
+    also_at : tuple of float
+        Positions of additional in-betweens, between 0 and 1.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same work as :mod:`.api` in steps, for user interfaces that show progress, stay alive and can stop::
+"""The functions of :mod:`.api` step by step, for user interfaces that show progress, stay responsive and can cancel::
 
     work = qc3d.steps.bake([rest, stride, rest], faces, frames=12)
     for step in work:
@@ -29,6 +29,7 @@ from .fit.fitted_map import FittedMap
 from .frames import task as tasks
 from .frames.bake import Bake, evenly_spaced
 from .frames.task import Outcome, Task
+from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
 from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
@@ -38,17 +39,12 @@ T = TypeVar("T")
 
 
 class Work(Generic[T]):
-    """Work that goes on while its steps are asked for.
+    """Work that advances while one iterates over its steps.
 
     Attributes
     ----------
     result
-        What came of it.
-
-    Raises
-    ------
-    AttributeError
-        Where the result is asked for before the last step.
+        The result, after the last step; before that, an AttributeError.
     """
 
     result: T
@@ -60,7 +56,7 @@ class Work(Generic[T]):
         self.result = yield from self._steps
 
     def run(self, progress: Callable[[Progress], object] | None = None) -> T:
-        """Go through all steps, calling ``progress`` with each, and return the result."""
+        """Run all steps, calling ``progress`` after each, and return the result."""
         self.result = finish(self._steps, progress)
         return self.result
 
@@ -87,7 +83,7 @@ def one_pair(
     polygons: ArrayLike | None,
     mirror: Mirror,
 ) -> KeyPair:
-    """Two keys as :func:`.api.fit` takes them."""
+    """Validate two keys, given as for :func:`.api.fit`."""
     ends = ("first", "second")
     shapes = dict(zip(ends, (key0, key1), strict=True))
     return consecutive_pairs(shapes, faces, edges, ends, polygons, mirror)[ends]
@@ -106,7 +102,7 @@ def bake(
     colliders: Sequence[Collider] = (),
     **options: Unpack[FitChoices],
 ) -> Work[Bake]:
-    """The frames through a row of keys, step by step; see :func:`.api.bake` for the parameters."""
+    """The frames through a chain of keys, step by step; see :func:`.api.bake` for the parameters."""
     if len(keys) < 2:
         raise InputError(f"There are {len(keys)} keys; in-betweens need two or more.")
     shapes, through = _named(keys)
@@ -136,12 +132,43 @@ def combine(
     order: Sequence[int] | None = None,
     **options: Unpack[FitChoices],
 ) -> Work[Combination]:
-    """Several keys of one base on at once, step by step; see :func:`.api.combine` for the parameters."""
+    """The combination of several keys, step by step; see :func:`.api.combine` for the parameters."""
     return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
 
 
+def bake_together(
+    meshes: Sequence[tuple[Sequence[ArrayLike], ArrayLike]],
+    frames: int | ArrayLike = 5,
+    *,
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    **options: Unpack[FitChoices],
+) -> Work[list[Bake]]:
+    """The frames of several meshes in one map, step by step; see :func:`.api.bake_together` for the parameters."""
+    counts = sorted({len(keys) for keys, _ in meshes})
+    if len(counts) != 1 or counts[0] < 2:
+        raise InputError(f"The meshes have {', '.join(map(str, counts)) or 'no'} keys; all need the same two or more.")
+    through = tuple(f"key {number}" for number in range(counts[0]))
+    placed = [
+        PlacedMesh(consecutive_pairs(dict(zip(through, keys, strict=True)), faces, None, through), np.eye(4))
+        for keys, faces in meshes
+    ]
+    together, frame_options = Together(placed), FrameOptions(mode, easing)
+    times = times_of(frames, len(through) - 1)
+    task = Task(together.pairs, through, FitOptions(**options), frame_options, times)
+    task.require_memory(machine_limit_mb())
+    return Work(_apart(tasks.carry_out(task), together, frame_options, through))
+
+
+def _apart(
+    steps: Steps[Outcome], together: Together, options: FrameOptions, through: Sequence[str]
+) -> Steps[list[Bake]]:
+    bake = yield from _bake_of(steps)
+    return together.apart(bake, options, through)
+
+
 def times_of(frames: int | ArrayLike, pairs: int = 1) -> Floats:
-    """Times of so many in-betweens between every two keys and of the keys themselves, or the times that are given."""
+    """(k,) times of the keys and of the given number of in-betweens between every two; or the given times."""
     if isinstance(frames, (int, np.integer)) and not isinstance(frames, bool):
         return evenly_spaced((int(frames) + 1) * pairs - 1)
     return np.atleast_1d(np.asarray(frames, dtype=np.float64))
@@ -154,7 +181,7 @@ def _bake_of(steps: Steps[Outcome]) -> Steps[Bake]:
 
 
 def _named(keys: Sequence[ArrayLike]) -> tuple[dict[str, ArrayLike], tuple[str, ...]]:
-    """A name for every key, the same where the very same array comes again: its pairs are then fitted once."""
+    """A name for each key; the same array gets the same name, so that repeated pairs are fitted only once."""
     names: dict[int, str] = {}
     through = tuple(names.setdefault(id(key), f"key {number}") for number, key in enumerate(keys))
     return dict(zip(through, keys, strict=True)), through

@@ -21,6 +21,7 @@ COMMANDS = {
     "combine": ([*_COMBINE, "--output", "OUT"], ".npz"),
     "bake": ([*_BAKE, "--output", "OUT"], ".blend"),
     "bake's report": ([*_BAKE, "--output", "OTHER", "--report", "OUT"], ".json"),
+    "export": (["export", "baked.blend", "--object", "Bar", "--output", "OUT"], ".usda"),
     "reconstruct": (["reconstruct", "map.npz", "--output", "OUT"], ".npz"),
     "compress": ([*_COMPRESS, "--output", "OUT"], ".qc3d"),
     "compress's report": ([*_COMPRESS, "--output", "OTHER", "--report", "OUT"], ".json"),

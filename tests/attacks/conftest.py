@@ -111,6 +111,7 @@ def inputs(bar: dict[str, np.ndarray], bar_scene: Path, tmp_path_factory: pytest
         ["interpolate", "bar.npz", *KEYS, "--frames", "0", "--mode", "straight", "--output", "frames.npz"],
         ["compress", "map.npz", "--modes", "3", "--scheme", "published", "--output", "map.qc3d"],
         ["compress", "frames.npz", "--modes", "3", "--output", "frames.qc3d"],
+        ["bake", "bar.blend", "--object", "Bar", "--on-key", "Bent", "--frames", "1", "--output", "baked.blend"],
     ):
         subprocess.run([*PROGRAM, *command], cwd=folder, check=True, capture_output=True, timeout=300)
     return folder

@@ -427,7 +427,7 @@ class TestPlacesThatMayNotBeEntered:
             arguments = folder_command(name, unprivileged)
         else:
             arguments = command(name, unprivileged / "one", unprivileged / "two")
-        inputs = ("bar.npz", "map.npz", "frames.npz", "bar.blend", "map.qc3d", "frames.qc3d")
+        inputs = ("bar.npz", "map.npz", "frames.npz", "bar.blend", "baked.blend", "map.qc3d", "frames.qc3d")
         status, said = run(*[unprivileged / "closed" / part if part in inputs else part for part in arguments])
         assert status == 2
         assert is_sentence(said)

@@ -233,16 +233,6 @@ class TestLaterFailures:
     def bake(self) -> Callable[..., str]:
         return lambda **choices: refused(bpy.ops.qc3d.bake_inbetweens, **{"count": 5, "play_on": "slider", **choices})
 
-    def test_a_locked_key_that_would_be_replaced(
-        self, baked: bpy.types.Object, state: State, bake: Callable[..., str]
-    ) -> None:
-        baked.data.shape_keys.key_blocks["Basis_to_Lean_100"].lock_shape = True
-        before = state()
-        assert bake() == (
-            "Error: Shape key 'Basis_to_Lean_100' of an earlier bake is locked; unlock it first."
-        )
-        assert state() == before
-
     def test_a_locked_key_that_is_only_read_is_no_obstacle(self, baked: bpy.types.Object) -> None:
         baked.data.shape_keys.key_blocks["Lean"].lock_shape = True
         assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean") == {'FINISHED'}

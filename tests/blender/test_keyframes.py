@@ -68,11 +68,14 @@ def test_another_range_moves_the_keyframes_that_a_bake_made(figure: bpy.types.Ob
 def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     from qc3d_addon.blender.bake.request import BakeRequest
     from qc3d_addon.blender.bake.run import bake_object
+    from qc3d_addon.solver.settings import FrameOptions
 
     bake()
     figure[SLIDER] = 0.25
     figure.keyframe_insert(PATH, frame=7)
-    result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, keyframes=(1, 11), play_on="slider"))
+    linear = FrameOptions("linear")
+    request = BakeRequest(("Basis", "Lean"), 1, frame_options=linear, keyframes=(1, 11), play_on="slider")
+    result = bake_object(figure, request)
     assert keyframes(figure) == [(7.0, 0.25)]
     assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
 

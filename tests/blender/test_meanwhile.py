@@ -292,7 +292,6 @@ class TestBetweenTwoBakes:
     @pytest.mark.parametrize(
         ("change", "said"),
         [
-            ("key.lock_shape = True", "is locked; unlock it first"),
             ("del obj[slider]; obj[slider] = 'text'", "is not a number any more"),
             ("obj[slider] = float('nan')", "has no value"),
         ],

@@ -58,13 +58,13 @@ def test_the_straight_blend_is_baked_instead(mirrored: bpy.types.Object, shapes:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_bake_in_another_mode_takes_its_place(figure: bpy.types.Object) -> None:
+def test_on_the_key_a_bake_in_another_mode_takes_its_place(figure: bpy.types.Object) -> None:
     choices = {**CHOICES, "to_key": "Lean"}
-    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='linear', **choices)
+    bpy.ops.qc3d.bake_inbetweens(play_on="key", mode='linear', **choices)
     bpy.ops.qc3d.heat_map(measure='stretch')
     assert "QC3D" in " ".join(figure.modifiers.keys())
-    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='straight', **choices)
-    assert not kept_measures.has(figure.data.shape_keys, "Basis_to_Lean")
+    bpy.ops.qc3d.bake_inbetweens(play_on="key", mode='straight', **choices)
+    assert not kept_measures.has(figure.data.shape_keys, "Lean")
     assert list(figure.modifiers) == []  # the heat map has nothing to show
-    bpy.ops.qc3d.bake_inbetweens(play_on="slider", mode='linear', **choices)
-    assert kept_measures.has(figure.data.shape_keys, "Basis_to_Lean")
+    bpy.ops.qc3d.bake_inbetweens(play_on="key", mode='linear', **choices)
+    assert kept_measures.has(figure.data.shape_keys, "Lean")

@@ -156,7 +156,7 @@ class TestErrors:
 
     def test_keys_and_a_target(self, keys: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         arguments = ["--from", "small", "--to", "long", "--target", keys, "--output", tmp_path / "out"]
-        assert "belongs to meshes" in self.said(capsys, keys, *arguments)
+        assert "is for tetrahedral meshes only" in self.said(capsys, keys, *arguments)
 
     def test_a_folder_that_is_a_file(self, blob: TetFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         write_tets(tmp_path / "map.npz", blob)

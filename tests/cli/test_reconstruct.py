@@ -96,7 +96,8 @@ def test_folds_are_told(mapping: Mapping, tmp_path: Path, capsys: pytest.Capture
     assert main.main(["reconstruct", str(source), "--landmarks", str(landmarks), "--output", str(output)]) == 0
     said = capsys.readouterr()
     assert f"{read_tets(output).mapping().folds} of 162 tetrahedra are folded" in said.err
-    assert said.out.startswith(f"162 tetrahedra rebuilt, {read_tets(output).mapping().folds} folds; volume ratio ")
+    folds = read_tets(output).mapping().folds
+    assert said.out.startswith(f"162 tetrahedra reconstructed, {folds} folds; volume ratio ")
     assert len(said.out.splitlines()) == 1
 
 
@@ -227,7 +228,7 @@ class TestErrors:
         [
             ("", "is empty; it must begin with the row"),
             ("vertex,x,y\n1,2,3\n", "begins with vertex,x,y; it must begin"),
-            ("vertex,x,y,z\n1.5,0,0,0\n", "1.5 is no number of a vertex"),
+            ("vertex,x,y,z\n1.5,0,0,0\n", "1.5 is not a vertex number"),
             ("vertex;x;y;z\n1;0;0;0;7\n", "row 2: four cells are needed"),
             ("vertex,x,y,z\n", "names no landmarks"),
             ("vertex,x,y,z\n1,2,3\n", "row 2: four cells are needed"),

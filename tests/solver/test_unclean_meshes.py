@@ -258,7 +258,8 @@ def assert_sound(bake: Bake, pair: KeyPair, mode: Mode, key_error: float = 1e-9)
     report = bake.report
     json.dumps(report.as_json(), allow_nan=False)
     assert report.folds.map == 0
-    assert report.key_error * pair.diagonal <= key_error * size
+    # Where all is in one point there is no size to measure by; keys are of size 1 then.
+    assert report.key_error * pair.diagonal <= key_error * size + 1e-15
     assert all((proof.smallest_determinant <= 0.0) == (proof.folds > 0) for proof in report.certificates)
     if mode == "natural":
         assert report.folds.frames == [0] * len(bake.times)
@@ -282,7 +283,8 @@ class TestUnreachableKeys:
     def test_parts_out_of_reach_bake_and_it_is_said(self, kind: str, mode: Mode) -> None:
         bake = baked_once(kind, mode)
         assert_sound(bake, pair_of(kind), mode)
-        assert any("mirrored or turned inside out" in note for note in bake.report.notes)
+        said = f"inside out between the keys, in the part of 12 vertices to which vertex {len(BAR)} belongs"
+        assert any(said in note for note in bake.report.notes)
 
     def test_nothing_of_the_kind_is_said_of_others(self) -> None:
         for kind in ("clean", "nested spheres", "some faces reversed", "all faces reversed", "moved as a whole"):

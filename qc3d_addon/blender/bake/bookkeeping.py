@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept beside the shape keys of a chain: its entry in the record, its measures, its maps."""
+"""What is kept beside the shape keys of a chain: its entry in the record, its measures and shapes, its maps."""
 
 from __future__ import annotations
 
@@ -10,14 +10,24 @@ from itertools import pairwise
 import bpy
 
 from ..heat_map import heat_map
-from ..store import id_properties, kept_measures
+from ..keys.chain_keys import base_key
+from ..kinds import keys_of
+from ..store import id_properties, kept_measures, kept_shapes
 from ..store.kept_measures import Measures
+from ..store.kept_shapes import Shapes
+from ..store.mesh_data import key_coordinates
 from ..store.records import PROPERTY, Chain, Record
 
 
-def remember(obj: bpy.types.Object, record: Record, chain: Chain, measures: Measures | None, undo: ExitStack) -> None:
-    """Keep the record, and the measures of the chain whose keys were written; show them where its heat map is shown."""
-    keys = obj.data.shape_keys
+def remember(
+    obj: bpy.types.Object, record: Record, chain: Chain, measures: Measures | None, shapes: Shapes, undo: ExitStack
+) -> None:
+    """Keep the record, and measures and shapes of the chain whose keys were written; show its heat map, where it is on.
+
+    ``shapes`` are those that the bake made, by place, without what was sculpted into them.
+    """
+    keys = keys_of(obj)
+    kept_shapes.keep(keys, chain.slider, key_coordinates(obj, base_key(keys, chain).name), shapes, undo)
     if measures:
         kept_measures.keep(keys, chain.slider, measures, undo)
     else:
@@ -29,6 +39,7 @@ def remember(obj: bpy.types.Object, record: Record, chain: Chain, measures: Meas
 def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -> None:
     """Forget a chain: its entry in the record, its measures, and the maps that no other chain needs."""
     kept_measures.forget(keys, chain.slider, undo)
+    kept_shapes.forget(keys, chain.slider, undo)
     record.chains.remove(chain)
     needed = {ends for other in record.chains for ends in pairwise(other.through)}
     for kept in [kept for kept in record.maps if (kept.from_key, kept.to_key) in set(pairwise(chain.through)) - needed]:
@@ -42,7 +53,7 @@ def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -
 
 def forget_all(obj: bpy.types.Object) -> None:
     """Forget all that is kept with the keys of ``obj``, sound or not, and hide its heat map; keys and sliders stay."""
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     heat_map.hide(obj)
     with ExitStack() as undo:
         for name in [name for name in keys.keys() if name == PROPERTY or name.startswith(f"{PROPERTY}_")]:  # noqa: SIM118

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ..kinds import mesh_of, shape_keys_of
 from ..store.mesh_data import key_coordinates, triangles
 
 if TYPE_CHECKING:
@@ -68,10 +69,10 @@ def _same(one: Collider, other: Collider) -> bool:
 
 def _shapes(other: bpy.types.Object, through: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Positions (k, c, 3) of a mesh at each key, in its own coordinates, and its triangles (f, 3)."""
-    keys = other.data.shape_keys
+    keys = shape_keys_of(other)
     if keys is not None and set(through) <= set(keys.key_blocks.keys()):
         shapes = {name: key_coordinates(other, name).astype(np.float64) for name in dict.fromkeys(through)}
-        return np.stack([shapes[name] for name in through]), triangles(other.data)
+        return np.stack([shapes[name] for name in through]), triangles(mesh_of(other))
     evaluated = other.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     try:

@@ -7,10 +7,9 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
-from bpy.app.handlers import persistent
 
 from .. import compat
 
@@ -35,7 +34,7 @@ class Job:
         self._part, self._parts = part, parts
         self.is_cancelled = False
         self._started = clock.monotonic()
-        self._worker: Any = Worker(task, limits)
+        self._worker = Worker(task, limits)
         self._at_end = ExitStack()
 
     @property
@@ -115,7 +114,7 @@ def end() -> None:
         job.stop()
 
 
-@persistent
+@compat.persistent
 def _on_load(*_: object) -> None:
     cancel()  # what it was started for is gone
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...solver.errors import InputError, QC3DError
 from ..keys import chain_keys
-from ..store import checks
+from ..kinds import keys_of
+from ..store import checks, combined_keys
 from ..store.records import Record
 from ..store.renames import digest
 from .plan import Plan, plan_bake, write_bake
@@ -61,14 +62,15 @@ def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
     InputError
         If the object cannot be baked.
     """
-    keys = checks.require_object(obj).data.shape_keys
+    keys = keys_of(checks.require_object(obj))
     made = {key.name for chain in Record.read(keys).chains for key in chain_keys.owned_keys(keys, chain).values()}
+    made |= combined_keys.names_made(keys)
     return [key.name for key in keys.key_blocks if key != keys.reference_key and key.name not in made]
 
 
 def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
     """The names, each once; raises InputError where one is no key that in-betweens can play on."""
-    known, blocks = bakeable_keys(obj), obj.data.shape_keys.key_blocks
+    known, blocks = bakeable_keys(obj), keys_of(obj).key_blocks
     for name in names:
         if name not in blocks:
             raise InputError(f"There is no shape key '{name}' on '{obj.name}'; choose from those of the mesh.")
@@ -79,7 +81,7 @@ def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def plan_key(obj: bpy.types.Object, name: str, choices: BakeRequest) -> Plan | Verdict:
+def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> Plan | Verdict:
     """What to compute for a key, or what there is to say where nothing is to be computed.
 
     Parameters
@@ -88,7 +90,7 @@ def plan_key(obj: bpy.types.Object, name: str, choices: BakeRequest) -> Plan | V
         Everything but the keys; a chain that the key plays already keeps the keys that it goes through.
     """
     try:
-        keys = checks.require_object(obj).data.shape_keys
+        keys = keys_of(checks.require_object(obj))
         chain = Record.read(keys).chain_on_key(name)
         base = keys.key_blocks[name].relative_key.name
         through = chain.through if chain is not None and chain.through[0] == base else (base, name)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...solver.errors import InputError, naming_pair
+from ..kinds import keys_of
 from ..store import checks, mesh_data
 from ..store.records import Chain, Record
 from .plan import kept_map, request_again
@@ -32,7 +33,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     from ...solver.fit.storage import why_unusable
     from ...solver.frames.modes import needs_fits
 
-    keys = checks.require_object(obj).data.shape_keys
+    keys = keys_of(checks.require_object(obj))
     record = Record.read(keys)
     request = request_again(obj, chain)
     if not needs_fits(request.frame_options.mode):
@@ -58,7 +59,7 @@ def load_maps(obj: bpy.types.Object, path: Path) -> KeptMaps:
     from ...solver.fit.files import read_maps
     from ...solver.fit.storage import from_bytes
 
-    keys = checks.require_object(obj).data.shape_keys
+    keys = keys_of(checks.require_object(obj))
     record = Record.read(keys)
     read = read_maps(path)
     for name in read.through:

@@ -17,6 +17,9 @@ import numpy as np
 
 from ...solver.errors import InputError
 from ..keys import chain_keys, chain_shapes, shape_keys
+from ..keys.double_motion import double_motion, unknown_inbetweens
+from ..keys.sculpted import Sculpted
+from ..kinds import keys_of
 from ..store import checks, mesh_data, names
 from ..store.records import Chain, KeptMap, Record
 from ..store.renames import digest
@@ -74,7 +77,7 @@ class Plan:
             raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
         checks.require_object(obj)
         try:
-            checks.require_control(obj.data.shape_keys, self.request.keys, self.request.base)
+            checks.require_control(keys_of(obj), self.request.keys, self.request.base)
             pairs = mesh_data.read_pairs(obj, self.request.keys, self.request.base)
         except InputError as error:
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. {error}") from error
@@ -94,7 +97,7 @@ def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    Record.read(obj.data.shape_keys)
+    Record.read(keys_of(obj))
     pairs = mesh_data.read_pairs(obj, request.keys)
     return Plan(request, Task(pairs, request.keys, request.fit_options), obj.session_uid, obj.name)
 
@@ -112,7 +115,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     from ...solver.frames.task import Task
 
     obj = checks.require_object(obj)
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     checks.require_keys(keys, request.keys)
     if request.play_on == "auto":
@@ -123,6 +126,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
     play = request.play_options
+    play = replace(play, also_at=(*play.also_at, *Sculpted.of(obj, chain).places))
     if play.tolerance > 0.0 and chain.request.get("tolerance") == play.tolerance:
         # Baked again with the same tolerance a chain does not lose steps, so that its keys can stay.
         play = replace(play, also_at=(*play.also_at, *chain.places[1:-1]))
@@ -149,7 +153,7 @@ def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
     InputError
         If the object cannot be used, or keys that the chain goes through are not there any more.
     """
-    problem = checks.chain_problem(checks.require_object(obj).data.shape_keys, chain)
+    problem = checks.chain_problem(keys_of(checks.require_object(obj)), chain)
     if problem is not None:
         raise InputError(problem)
     return BakeRequest.again(chain.through, chain.request)
@@ -166,7 +170,7 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     from ...solver.frames.bake import evenly_spaced
 
     request = request_again(obj, chain)
-    chain_keys.control_of(obj, chain).require()
+    chain_keys.control_of(checks.require_object(obj), chain).require()
     plan = plan_bake(obj, request)
     times = evenly_spaced(PREVIEW_STEPS * (len(request.keys) - 1) - 1)
     even = replace(request.frame_options, easing="linear")
@@ -181,7 +185,7 @@ def write_maps(plan: Plan, outcome: Outcome) -> None:
     InputError
         If the object is gone or was changed meanwhile; it is as it was.
     """
-    keys = plan.find_object().data.shape_keys
+    keys = keys_of(plan.find_object())
     record = Record.read(keys)
     with ExitStack() as undo:
         _keep_maps(keys, record, plan, outcome, undo)
@@ -201,7 +205,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     assert bake is not None
     played = bake.report.played
     assert played is not None
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     record = Record.read(keys)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
@@ -210,13 +214,17 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         shapes = chain_shapes.offsets_by_step(obj, steps.places, bake.frames)
     else:
         shapes = chain_shapes.shapes_by_step(obj, _steps_of_keys(steps.places, request), bake.frames)
+    sculpted = Sculpted.of(obj, chain)
+    sculpted.require_among(steps.places)
+    shapes, made, kept = sculpted.kept(steps.places, shapes)
 
     with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
         control = chain_keys.control_of(obj, chain)
         owner = obj.name if control.is_key else control.owner.name
-        notes = [*plan.notes, *bake.report.notes, *said]
+        notes = [*plan.notes, *bake.report.notes, *said, *kept]
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
-        notes += [] if control.is_key else _values_that_add(keys, request)
+        notes += double_motion(obj, chain, record.chains)
+        notes += unknown_inbetweens(keys, chain, record.chains) if chain.on_key else []
         if obj.show_only_shape_key:
             notes.append(f"'{obj.name}' shows its active key only; unpin that to see the in-betweens play.")
         report = {
@@ -238,7 +246,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         chain.result = Summary.of_report(bake.report, steps.places, notes)
         record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
         _keep_maps(keys, record, plan, outcome, undo)
-        bookkeeping.remember(obj, record, chain, bake.measures, undo)
+        bookkeeping.remember(obj, record, chain, bake.measures, made, undo)
         result = BakeResult(control.name, owner, tuple(chain.keys.values()), tuple(notes), report)
     return result
 
@@ -263,10 +271,13 @@ def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
     """The entry of these keys in the record, made where there is none."""
     on_key = request.keys[-1] if request.play_on == "key" else ""
-    chain = record.chain_on_key(on_key) if on_key else record.chain(request.keys)
+    mode = request.frame_options.mode
+    chain = record.chain_on_key(on_key) if on_key else record.chain(request.keys, mode)
     if chain is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
-        chain = Chain(request.keys, names.chain_label((on_key,) if on_key else request.keys, taken), on_key=on_key)
+        mark = f"_{mode}" if record.chain(request.keys) is not None and not on_key else ""
+        label = names.chain_label((on_key,) if on_key else request.keys, taken, mark)
+        chain = Chain(request.keys, label, on_key=on_key)
         record.chains.append(chain)
     chain.through = request.keys
     return chain
@@ -279,13 +290,3 @@ def _steps_of_keys(places: tuple[float, ...], request: BakeRequest) -> dict[int,
     at_keys = uneased(np.linspace(0.0, 1.0, len(request.keys)), request.frame_options.easing)
     steps = np.abs(np.array(places)[:, None] - at_keys).argmin(axis=0)
     return dict(zip(steps.tolist(), request.keys, strict=True))
-
-
-def _values_that_add(keys: bpy.types.Key, request: BakeRequest) -> list[str]:
-    """A sentence for each of the keys that is on by itself: the slider alone would show another shape."""
-    blocks = [keys.key_blocks[name] for name in dict.fromkeys(request.keys)]
-    return [
-        f"Key '{key.name}' is on by itself ({key.value:.2f}), which adds to what the slider shows; set it to 0."
-        for key in blocks
-        if key != keys.reference_key and key.value != 0.0 and not key.mute
-    ]

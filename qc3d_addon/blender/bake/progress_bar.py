@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
+from ..kinds import present
 from . import jobs
 
 
@@ -23,14 +26,15 @@ def show(context: bpy.types.Context) -> None:
 
 def clear() -> None:
     """Give the status bar back to Blender, and draw the sidebars anew."""
-    for window in bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=window):  # only its own status bar is drawn anew
+    override: Any = bpy.context.temp_override  # the stubs of 5.2 know no block that it can be for
+    for window in present(bpy.context.window_manager).windows:
+        with override(window=window):  # only its own status bar is drawn anew
             window.workspace.status_text_set(None)
     _redraw_sidebars()
 
 
 def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
-    layout, job = header.layout, jobs.current()
+    layout, job = present(header.layout), jobs.current()
     if job is not None:
         layout.label(text=job.label, icon='SHAPEKEY_DATA')
         bar = layout.row()
@@ -45,7 +49,7 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
 
 
 def _redraw_sidebars() -> None:
-    for window in bpy.context.window_manager.windows:
+    for window in present(bpy.context.window_manager).windows:
         for area in window.screen.areas:
             if area.type == 'VIEW_3D':
                 for region in area.regions:

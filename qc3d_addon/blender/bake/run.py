@@ -14,10 +14,12 @@ import bpy
 
 from ...solver.errors import InputError
 from .. import native_files
+from ..kinds import keys_of, mesh_of
 from ..store import checks
 from .many import Verdict, bake_keys, bakeable_keys
 from .plan import Plan, plan_bake, write_bake
 from .request import BakeRequest, BakeResult
+from .together import plan_together, write_together
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -51,6 +53,33 @@ def bake_object(
     return write_bake(plan, finish(carry_out(plan.task), on_progress))
 
 
+def bake_objects_together(
+    objects: Sequence[bpy.types.Object],
+    request: BakeRequest,
+    one_control: bool = True,
+    on_progress: OnProgress | None = None,
+) -> list[BakeResult]:
+    """Make the in-betweens of several objects of one character in one map, in this process.
+
+    Parameters
+    ----------
+    one_control
+        Whether what plays those of the first object drives the others.
+
+    Raises
+    ------
+    QC3DError
+        If an object, the keys or the settings cannot be used; all are as they were.
+    """
+    from ...solver.frames.task import carry_out
+    from ...solver.support.memory import machine_limit_mb
+    from ...solver.support.progress import finish
+
+    plan = plan_together(objects, request)
+    plan.task.require_memory(machine_limit_mb())
+    return write_together(plan, finish(carry_out(plan.task), on_progress), one_control)
+
+
 def bake_object_keys(
     obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, on_progress: OnProgress | None = None
 ) -> list[Verdict]:
@@ -82,7 +111,7 @@ def bake_object_keys(
 def bake_file(
     path: Path,
     object_names: Sequence[str],
-    work: Callable[[bpy.types.Object], tuple[Result, object]],
+    work: Callable[[Sequence[bpy.types.Object]], list[tuple[Result, object]]],
     output: Path,
     report: Path | None = None,
 ) -> list[Result]:
@@ -97,7 +126,7 @@ def bake_file(
     object_names
         Names of the objects to bake; empty for all meshes with two shape keys or more.
     work
-        Bakes one of them; gives what to return of it and, as plain values, what to report.
+        Bakes them; gives for each what to return of it and, as plain values, what to report.
     output
         The .blend file to write; it may be the same as ``path``.
     report
@@ -116,7 +145,7 @@ def bake_file(
     _open(path)
     size = path.stat().st_size
     objects = _objects(path, object_names)
-    done = {obj.name: work(obj) for obj in objects}
+    done = dict(zip([obj.name for obj in objects], work(objects), strict=True))
     told = [values for _, values in done.values()]
     values = told[0] if len(object_names) == 1 else dict(zip(done, told, strict=True))
     # Beside their places: Blender writes the paths of images and libraries relative to the file's own folder.
@@ -125,6 +154,18 @@ def bake_file(
         for unfinished_report in unfinished_reports:
             unfinished_report.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
     return [result for result, _ in done.values()]
+
+
+def opened_object(path: Path, name: str) -> bpy.types.Object:
+    """An object of a .blend file, which is opened in place of what is open; scripts in it do not run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or has no such object.
+    """
+    _open(path)
+    return _objects(path, [name])[0]
 
 
 def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
@@ -161,7 +202,7 @@ def _save(new: Path, output: Path, size: int) -> None:
 
 
 def _bytes_of_keys(obj: bpy.types.Object) -> int:
-    return len(obj.data.shape_keys.key_blocks) * len(obj.data.vertices) * 12
+    return len(keys_of(obj).key_blocks) * len(mesh_of(obj).vertices) * 12
 
 
 def _open(path: Path) -> None:

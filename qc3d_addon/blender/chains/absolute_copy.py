@@ -13,7 +13,8 @@ from ...solver.arrays import Floats
 from .. import compat
 from ..heat_map import heat_map
 from ..keys import chain_keys, chain_shapes, drivers
-from ..store import names
+from ..kinds import keys_of, mesh_of, shape_keys_of
+from ..store import id_properties, names
 from ..store.mesh_data import set_key_coordinates
 from ..store.records import Chain
 
@@ -43,19 +44,19 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
     )
     with ExitStack() as undo:
         copy = copied(obj, undo)
-        copy.name = copy.data.name = f"{obj.name} absolute"
+        copy.name = mesh_of(copy).name = f"{obj.name} absolute"
         heat_map.hide(copy)  # which is the original's
         compat.clear_shape_keys(copy)
         for name in [name for name in copy.keys() if name.startswith("qc3d")]:  # noqa: SIM118 - not a dictionary
             del copy[name]
-        if chain.slider in copy:
+        if id_properties.has(copy, chain.slider):
             del copy[chain.slider]
         copy.animation_data_clear()
         for step, shape in enumerate(shapes):
             key = copy.shape_key_add(name=names.key_name(chain.slider, step, places.tolist()), from_mix=False)
             set_key_coordinates(key, shape)
             key.interpolation = 'KEY_LINEAR'
-        absolute = copy.data.shape_keys
+        absolute = keys_of(copy)
         absolute.use_relative = False
         for name in list(absolute.keys()):
             del absolute[name]
@@ -77,19 +78,20 @@ def _denser(places: tuple[float, ...]) -> Floats:
 
 def copied(obj: bpy.types.Object, undo: ExitStack) -> bpy.types.Object:
     """A copy of a mesh object, with a mesh and keys of its own; closing ``undo`` removes it without a trace."""
+    original = mesh_of(obj)
     copy = obj.copy()
-    undo.callback(_remove, copy, obj.data)
-    copy.data = obj.data.copy()
+    undo.callback(_remove, copy, original)
+    copy.data = original.copy()
     return copy
 
 
 def _remove(copy: bpy.types.Object, original: bpy.types.Mesh) -> None:
     """Remove an object with its mesh and keys, if they are not the original's, and the actions that only they used."""
-    mesh, keys = copy.data, copy.data.shape_keys
+    mesh, keys = mesh_of(copy), shape_keys_of(copy)
     actions = {block.animation_data.action for block in (copy, keys) if block is not None and block.animation_data}
     bpy.data.objects.remove(copy)
     if mesh != original:
         bpy.data.meshes.remove(mesh)
-    for action in actions - {None}:
-        if action.users == 0:
+    for action in actions:
+        if action is not None and action.users == 0:
             bpy.data.actions.remove(action)

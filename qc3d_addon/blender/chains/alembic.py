@@ -13,6 +13,7 @@ from ...solver.errors import InputError
 from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
 from ..keys import chain_keys, drivers, slider
+from ..kinds import keys_of, mesh_of, present
 from ..store.records import Chain
 from .absolute_copy import copied
 
@@ -31,25 +32,25 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
     InputError
         If the file cannot be written; what was there is kept.
     """
-    scene, layer = context.scene, context.view_layer
+    scene, layer = present(context.scene), present(context.view_layer)
     control = chain_keys.control_of(obj, chain)
     with ExitStack() as undo:
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
-        undo.callback(_select, layer, set(context.selected_objects), layer.objects.active)
+        undo.callback(_select, layer, set(context.selected_objects or ()), layer.objects.active)
         copy = copied(obj, undo)
         collection = bpy.data.collections.new("QC3D export")
         undo.callback(bpy.data.collections.remove, collection)
         scene.collection.children.link(collection)
         collection.objects.link(copy)
         copy.animation_data_clear()
-        played = control.of(copy.data.shape_keys if control.is_key else copy)
+        played = control.of(keys_of(copy) if control.is_key else copy)
         if control.is_key:
-            copy.data.shape_keys.driver_remove(control.path)
+            keys_of(copy).driver_remove(control.path)
         else:
             copy[chain.slider] = 0.0
-            for driven in drivers.driven_by(copy.data.shape_keys, control.path).values():
+            for driven in drivers.driven_by(keys_of(copy), control.path).values():
                 if drivers.reads(driven.driver, control):
-                    driven.driver.variables[0].targets[0].id = copy
+                    present(driven.driver).variables[0].targets[0].id = copy
         curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, (1, frames))
         _select(layer, {copy}, copy)
@@ -58,7 +59,12 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
             native_files.require_short(unfinished, path)
             try:
                 result = bpy.ops.wm.alembic_export(
-                    filepath=str(unfinished), start=1, end=frames, selected=True, as_background_job=False
+                    filepath=str(unfinished),
+                    start=1,
+                    end=frames,
+                    selected=True,
+                    apply_subdiv=True,  # else a Subdivision modifier at the end is left out
+                    as_background_job=False,
                 )
             except RuntimeError as error:
                 words = native_files.words(error, unfinished, path)
@@ -82,13 +88,14 @@ def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: in
     show in the viewport what that gives.
     """
     shown = [modifier for modifier in copy.modifiers if modifier.show_render]
-    if shown and shown[-1].type == 'SUBSURF' and shown[-1].subdivision_type == 'CATMULL_CLARK':
+    last = shown[-1] if shown else None
+    if isinstance(last, bpy.types.SubsurfModifier) and last.subdivision_type == 'CATMULL_CLARK':
         shown.pop()
     for modifier in copy.modifiers:
         modifier.show_viewport = modifier in shown
-        if hasattr(modifier, "render_levels"):
+        if isinstance(modifier, (bpy.types.SubsurfModifier, bpy.types.MultiresModifier)):
             modifier.levels = modifier.render_levels
-    mesh = copy.evaluated_get(context.evaluated_depsgraph_get()).data
+    mesh = mesh_of(copy.evaluated_get(context.evaluated_depsgraph_get()))
     corners = len(mesh.vertices) + len(mesh.loops)
     once = _BYTES_ONCE + _BYTES_OF_TEXTURE * len(mesh.uv_layers)
     return corners * (_BYTES_OF_FRAME * frames + once) + _BYTES_BESIDE

@@ -14,6 +14,7 @@ from .. import compat
 from ..bake import bookkeeping
 from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control, value_path
+from ..kinds import expect, keys_of, present
 from ..store.records import Chain, Record
 from . import remove
 
@@ -26,7 +27,7 @@ def positions(context: bpy.types.Context, control: Control, frames: range) -> ND
     InputError
         If there is no such slider, or it is no number at one of the frames.
     """
-    scene = context.scene
+    scene = present(context.scene)
     current, part = scene.frame_current, scene.frame_subframe
     values = []
     try:
@@ -54,7 +55,7 @@ def bake_to_keyframes(
     InputError
         If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
     """
-    keys = obj.data.shape_keys
+    keys, scene = keys_of(obj), present(context.scene)
     control = shape_keys.require_removable(obj, chain)
     shape_keys.require_action(keys)
     control.require()
@@ -74,7 +75,7 @@ def bake_to_keyframes(
     remove.hide_heat_map(obj, chain)
     notes += remove.remove_slider(control, chain)
     keys.update_tag()
-    context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     return notes
 
 
@@ -96,6 +97,7 @@ def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values:
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", np.column_stack([frames, values]).ravel())
-    linear = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items['LINEAR'].value
+    interpolations = expect(bpy.types.EnumProperty, bpy.types.Keyframe.bl_rna.properties["interpolation"])
+    linear = interpolations.enum_items['LINEAR'].value
     curve.keyframe_points.foreach_set("interpolation", [linear] * len(frames))
     curve.update()

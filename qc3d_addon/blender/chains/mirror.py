@@ -13,41 +13,43 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError
 from ..bake import bookkeeping
 from ..keys import chain_keys, shape_keys
+from ..keys.sculpted import Sculpted
+from ..kinds import keys_of
 from ..store import kept_measures, names
 from ..store.mesh_data import key_coordinates
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
+from .mirror_image import MirrorImage, mirror_image
 
 _SAME = 1e-4  # of the size: keys that were mirrored by other tools are rounded
 
 
-def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
+def mirror_chain(
+    obj: bpy.types.Object, record: Record, chain: Chain, use_topology: bool = False
+) -> tuple[Chain, list[str]]:
     """Make the mirror image of a chain, with keys of its own; one made before is brought up to date.
 
     What a key's value plays goes onto the value of the key that is its mirror image; anything else gets a slider.
 
-    Every vertex goes where the mirror image of its partner goes, bit for bit. The sides in the keys' names, such as
+    Every vertex goes where the mirror image of its partner goes, bit for bit where the Basis is symmetric to the bit.
+    The few that have no partner, which a sentence is returned about, move as what is nearest there. The sides in the
+    keys' names, such as
     ".L", are flipped; names without a side get "mirrored" behind them.
 
     Raises
     ------
     InputError
-        If the Basis is not symmetric across x = 0, the chain is a mirror image itself, the other side was baked from
-        keys of its own, or keys cannot be written; nothing was changed.
+        If the Basis is not nearly symmetric across x = 0, the chain is a mirror image itself, the other side was baked
+        from keys of its own, or keys cannot be written; nothing was changed.
     """
-    from ...solver.triangles.mirror_symmetry import mirror_partners
-
     if chain.mirror_of:
         raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     steps = chain_keys.all_owned_keys(keys, chain)
     base = chain_keys.base_key(keys, chain).name
-    rest = key_coordinates(obj, keys.reference_key.name)
-    ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
-    obj.data.edges.foreach_get("vertices", ends)
-    partners = mirror_partners(rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64))
-    flipped = np.array([-1.0, 1.0, 1.0], dtype=np.float32)
-    shapes = {step: key_coordinates(obj, key.name)[partners] * flipped for step, key in steps.items()}
+    image = mirror_image(obj, use_topology)
+    partners = image.partners
+    shapes = {step: image.of(key_coordinates(obj, key.name)) for step, key in steps.items()}
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
     if through == chain.through:
@@ -56,8 +58,8 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         through = (*through[:-1], f"{through[-1]}_mirrored")
     on_key = through[-1] if chain.on_key else ""
     if on_key:
-        shape = key_coordinates(obj, chain.on_key)[partners] * flipped
-        _require_mirror_image(obj, on_key, shape, base)
+        shape = image.of(key_coordinates(obj, chain.on_key))
+        _require_mirror_image(obj, on_key, shape, base, image)
     mirrored = record.chain_on_key(on_key) if on_key else record.chain(through)
     if mirrored is None:
         taken = {*obj.keys(), *(other.slider for other in record.chains)}
@@ -69,22 +71,28 @@ def mirror_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> Chain:
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
     places = shape_keys.Steps(chain.places, chain.corners)
+    sculpted = Sculpted.of(obj, mirrored)
+    sculpted.require_among(chain.places)
+    shapes, made, _ = sculpted.kept(chain.places, shapes)
     with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
-        bookkeeping.remember(obj, record, mirrored, measures, undo)
-    return mirrored
+        bookkeeping.remember(obj, record, mirrored, measures, made, undo)
+    return mirrored, image.note()
 
 
-def _require_mirror_image(obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str) -> None:
+def _require_mirror_image(
+    obj: bpy.types.Object, name: str, shape: NDArray[np.float32], base: str, image: MirrorImage
+) -> None:
     """Raise InputError unless the key of that name has this shape and is relative to ``base``."""
-    key = obj.data.shape_keys.key_blocks.get(name)
+    key = keys_of(obj).key_blocks.get(name)
     if key is None:
         raise InputError(f"There is no key '{name}' for the mirror image; mirror the key first.")
     size = float(np.ptp(shape, axis=0).max())
-    if key.relative_key.name != base or np.abs(key_coordinates(obj, name) - shape).max() > _SAME * size:
+    missed = np.abs(key_coordinates(obj, name) - shape)[image.has_partner]
+    if key.relative_key.name != base or missed.max() > _SAME * size:
         raise InputError(f"'{name}' is not the mirror image of the other side's key; bake it by itself.")
 
 

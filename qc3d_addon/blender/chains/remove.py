@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import ExitStack
 
 import bpy
@@ -14,6 +13,7 @@ from ..bake import bookkeeping
 from ..heat_map import heat_map
 from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control
+from ..kinds import keys_of
 from ..store.records import Chain, Record
 
 
@@ -31,10 +31,10 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     """
     control = shape_keys.require_removable(obj, chain)
     hide_heat_map(obj, chain)
-    shape_keys.remove_keys(obj, list(chain_keys.owned_keys(obj.data.shape_keys, chain).values()))
-    notes = remove_slider(control, chain)
+    notes = shape_keys.remove_keys(obj, list(chain_keys.owned_keys(keys_of(obj), chain).values()))
+    notes += remove_slider(control, chain)
     with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
-        bookkeeping.forget(obj.data.shape_keys, record, chain, undo)
+        bookkeeping.forget(keys_of(obj), record, chain, undo)
         undo.pop_all()
     return notes
 
@@ -46,12 +46,14 @@ def remove_slider(control: Control, chain: Chain) -> list[str]:
         return []
     if not control.is_number:
         return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
-    readers = sum(1 for curve in _drivers() if drivers.reads(curve.driver, control))
+    readers = sum(1 for curve in drivers.all_drivers() if drivers.reads(curve.driver, control))
     if readers:
         what = "driver reads" if readers == 1 else "drivers read"
         return [f"The slider '{chain.slider}' stays, since {readers} {what} it."]
     path = control.path
     notes = []
+    if owner.animation_data is not None and owner.animation_data.drivers.find(path) is not None:
+        owner.driver_remove(path)  # it kept the slider where that of another object is
     if compat.find_fcurve(owner, path) is not None:
         if chain.keyframes is not None:
             compat.remove_fcurve(owner, path)
@@ -67,20 +69,3 @@ def hide_heat_map(obj: bpy.types.Object, chain: Chain) -> None:
     state = heat_map.shown(obj)
     if state is not None and state.slider == chain.slider:
         heat_map.hide(obj)
-
-
-def _drivers() -> Iterator[bpy.types.FCurve]:
-    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
-    for collection in bpy.data.bl_rna.properties:
-        if collection.type != 'COLLECTION':
-            continue
-        for block in getattr(bpy.data, collection.identifier):
-            owner = block.user if isinstance(block, bpy.types.Key) else block
-            if owner is None or not owner.users:
-                continue
-            animation = getattr(block, "animation_data", None)
-            if animation is not None:
-                yield from animation.drivers
-            tree = getattr(block, "node_tree", None)
-            if tree is not None and tree.animation_data is not None:
-                yield from tree.animation_data.drivers

@@ -11,8 +11,9 @@ of it needs the add-on: it is saved, played and rendered without.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import bpy
 import numpy as np
@@ -23,11 +24,15 @@ from .. import compat
 from ..keys import drivers
 from ..keys.chain_keys import control_of
 from ..keys.control import Control
+from ..kinds import expect, keys_of, mesh_of, present
 from ..store import id_properties, kept_measures
 from ..store import stored_values as stored
 from ..store.kept_measures import MEASURES
 from ..store.records import Chain
 from .colors import Scale, linear, scale_between, scale_of
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import NodeMathItems
 
 NAME = "QC3D Heat Map"  # of the modifier, its nodes and the colour attribute
 _STATE = "qc3d_heat_map"
@@ -62,8 +67,8 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
     InputError
         If the bake's measures are not kept or belong to another mesh, or the slider cannot play anything.
     """
-    mesh = obj.data
-    measures = kept_measures.read(mesh.shape_keys, chain.slider, len(mesh.vertices))
+    mesh = mesh_of(obj)
+    measures = kept_measures.read(keys_of(obj), chain.slider, len(mesh.vertices))
     if measures is None or len(measures[measure]) != chain.intervals + 1:
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them first.")
     control = control_of(obj, chain)
@@ -83,13 +88,14 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
         mesh.color_attributes.active_color_name = NAME
         tree = bpy.data.node_groups.new(NAME, 'GeometryNodeTree')
         undo.callback(bpy.data.node_groups.remove, tree)
-        _make_nodes(tree, measure, scale)
+        _make_nodes(expect(bpy.types.GeometryNodeTree, tree), measure, scale)
         _drive(tree, control, chain)
         id_properties.put(obj, _STATE, json.dumps(state), undo)
         modifier = _modifier(obj)
         if modifier is None:
-            modifier = obj.modifiers.new(NAME, 'NODES')
-            undo.callback(obj.modifiers.remove, modifier)
+            added = obj.modifiers.new(NAME, 'NODES')
+            undo.callback(obj.modifiers.remove, added)
+            modifier = expect(bpy.types.NodesModifier, added)
             modifier.show_expanded = False
         before = modifier.node_group
         undo.callback(setattr, modifier, "node_group", before)
@@ -104,7 +110,7 @@ def refresh(obj: bpy.types.Object, chain: Chain) -> None:
     state = shown(obj)
     if state is None or state.slider != chain.slider:
         return
-    if kept_measures.has(obj.data.shape_keys, chain.slider):
+    if kept_measures.has(keys_of(obj), chain.slider):
         show(obj, chain, state.measure)
     else:  # a straight blend has none
         hide(obj)
@@ -113,8 +119,8 @@ def refresh(obj: bpy.types.Object, chain: Chain) -> None:
 def hide(obj: bpy.types.Object) -> None:
     """Remove the heat map and everything that it added."""
     before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
-    _set_attributes(obj.data, None)
-    _set_active_colour(obj.data, before)
+    _set_attributes(mesh_of(obj), None)
+    _set_active_colour(mesh_of(obj), before)
     if modifier is not None:  # last: for as long as it is there, the heat map is known and can be hidden
         tree = modifier.node_group
         obj.modifiers.remove(modifier)
@@ -125,7 +131,7 @@ def hide(obj: bpy.types.Object) -> None:
 
 def _modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     modifier = obj.modifiers.get(NAME)
-    return modifier if modifier is not None and modifier.type == 'NODES' else None
+    return modifier if isinstance(modifier, bpy.types.NodesModifier) else None
 
 
 def _state(obj: bpy.types.Object) -> dict[str, Any]:
@@ -137,7 +143,7 @@ def _state(obj: bpy.types.Object) -> dict[str, Any]:
 
 
 def _active_colour(mesh: bpy.types.Mesh) -> str:
-    return mesh.color_attributes.active_color_name if mesh.color_attributes else ""
+    return (mesh.color_attributes.active_color_name or "") if mesh.color_attributes else ""
 
 
 def _set_active_colour(mesh: bpy.types.Mesh, name: object) -> None:
@@ -150,7 +156,7 @@ def _attributes(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.float32]] | None:
     """Values (n,) of the heat map's attributes by name; None where there are none, not even for its colours."""
     found = {}
     for attribute in mesh.attributes:
-        if _is_ours(attribute.name) and attribute.name != NAME and attribute.data_type == 'FLOAT':
+        if _is_ours(attribute.name) and attribute.name != NAME and isinstance(attribute, bpy.types.FloatAttribute):
             found[attribute.name] = np.empty(len(attribute.data), dtype=np.float32)
             attribute.data.foreach_get("value", found[attribute.name])
     return found if found or NAME in mesh.attributes else None
@@ -163,7 +169,7 @@ def _set_attributes(mesh: bpy.types.Mesh, values: dict[str, NDArray[np.float32]]
     if values is None:
         return
     for name, at_vertices in values.items():
-        attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
+        attribute = expect(bpy.types.FloatAttribute, mesh.attributes.new(name, 'FLOAT', 'POINT'))
         attribute.data.foreach_set("value", np.ascontiguousarray(at_vertices))
     mesh.color_attributes.new(NAME, 'FLOAT_COLOR', 'POINT')
 
@@ -175,11 +181,13 @@ def _is_ours(name: str) -> bool:
     return len(words) == 3 and words[0] == "QC3D" and words[1] in MEASURES and words[2].isdigit()
 
 
-def _make_nodes(tree: bpy.types.NodeTree, measure: str, scale: Scale) -> None:
+def _make_nodes(tree: bpy.types.GeometryNodeTree, measure: str, scale: Scale) -> None:
     """Nodes that blend the two steps around the slider's position, for every measure, and colour one of them."""
     tree.is_modifier = True
+    # The stubs of 5.2 know no kind of socket.
+    new_socket: Callable[..., object] = present(tree.interface).new_socket
     for direction in ('INPUT', 'OUTPUT'):
-        tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
+        new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
     make, link = tree.nodes.new, tree.links.new
     along = make('ShaderNodeValue')
     along.name = along.label = "Slider"
@@ -192,11 +200,11 @@ def _make_nodes(tree: bpy.types.NodeTree, measure: str, scale: Scale) -> None:
         ends = []
         for text in texts:
             replace = make('FunctionNodeReplaceString')
-            replace.inputs["String"].default_value = f"QC3D {name} #"
-            replace.inputs["Find"].default_value = "#"
+            _give(replace.inputs["String"], f"QC3D {name} #")
+            _give(replace.inputs["Find"], "#")
             link(text, replace.inputs["Replace"])
             attribute = make('GeometryNodeInputNamedAttribute')
-            attribute.data_type = 'FLOAT'
+            expect(bpy.types.GeometryNodeInputNamedAttribute, attribute).data_type = 'FLOAT'
             link(replace.outputs[0], attribute.inputs["Name"])
             ends.append(attribute.outputs[0])
         # first + part (second - first); after the last step there is none, and the part is 0.
@@ -209,14 +217,22 @@ def _make_nodes(tree: bpy.types.NodeTree, measure: str, scale: Scale) -> None:
     link(geometry, make('NodeGroupOutput').inputs[0])
 
 
+def _give(socket: bpy.types.NodeSocket, value: float | str) -> None:
+    """Give an input to which nothing is linked its value."""
+    socket.default_value = value  # type: ignore[attr-defined]  # each kind of socket has one, all in one do not
+
+
 def _math(
-    tree: bpy.types.NodeTree, operation: str, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket | float = 0.0
+    tree: bpy.types.NodeTree,
+    operation: NodeMathItems,
+    first: bpy.types.NodeSocket,
+    second: bpy.types.NodeSocket | float = 0.0,
 ) -> bpy.types.NodeSocket:
     node = tree.nodes.new('ShaderNodeMath')
-    node.operation = operation
+    expect(bpy.types.ShaderNodeMath, node).operation = operation
     tree.links.new(first, node.inputs[0])
     if isinstance(second, float):
-        node.inputs[1].default_value = second
+        _give(node.inputs[1], second)
     else:
         tree.links.new(second, node.inputs[1])
     return node.outputs[0]
@@ -225,7 +241,7 @@ def _math(
 def _whole_number_text(tree: bpy.types.NodeTree, number: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     node = tree.nodes.new('FunctionNodeValueToString')
     tree.links.new(number, node.inputs["Value"])
-    node.inputs["Decimals"].default_value = 0
+    _give(node.inputs["Decimals"], 0)
     return node.outputs[0]
 
 
@@ -233,12 +249,13 @@ def _store(
     tree: bpy.types.NodeTree,
     geometry: bpy.types.NodeSocket,
     name: str,
-    kind: str,
+    kind: Literal['FLOAT', 'FLOAT_COLOR'],
     value: bpy.types.NodeSocket,
 ) -> bpy.types.NodeSocket:
     node = tree.nodes.new('GeometryNodeStoreNamedAttribute')
-    node.data_type, node.domain = kind, 'POINT'
-    node.inputs["Name"].default_value = name
+    store = expect(bpy.types.GeometryNodeStoreNamedAttribute, node)
+    store.data_type, store.domain = kind, 'POINT'
+    _give(node.inputs["Name"], name)
     tree.links.new(geometry, node.inputs["Geometry"])
     tree.links.new(value, next(socket for socket in node.inputs if socket.name == "Value" and socket.enabled))
     return node.outputs[0]
@@ -247,15 +264,15 @@ def _store(
 def _colour(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale) -> bpy.types.NodeSocket:
     place = tree.nodes.new('ShaderNodeMapRange')
     tree.links.new(_math(tree, 'LOGARITHM', value, float(np.e)), place.inputs["Value"])
-    place.inputs["From Min"].default_value = float(np.log(scale.low))
-    place.inputs["From Max"].default_value = float(np.log(scale.high))
+    _give(place.inputs["From Min"], float(np.log(scale.low)))
+    _give(place.inputs["From Max"], float(np.log(scale.high)))
     ramp = tree.nodes.new('ShaderNodeValToRGB')
-    stops = ramp.color_ramp.elements
+    stops = present(expect(bpy.types.ShaderNodeValToRGB, ramp).color_ramp).elements
     while len(stops) < len(scale.colours):
         stops.new(0.5)
     for number, colour in enumerate(scale.colours):
         stops[number].position = number / (len(scale.colours) - 1)
-        stops[number].color = (*linear(colour), 1.0)
+        stops[number].color = (*linear(colour), 1.0)  # type: ignore[assignment,unused-ignore]  # only with 5.2's stubs
     tree.links.new(place.outputs["Result"], ramp.inputs[0])
     return ramp.outputs[0]
 

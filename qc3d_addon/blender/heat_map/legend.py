@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 import contextlib
+from typing import cast
 
 import bpy
 
+from ..kinds import expect, present
+from ..store import id_properties
 from . import heat_map
 from .colors import Scale
 
@@ -19,28 +22,34 @@ _handles: list[object] = []
 
 def enter(context: bpy.types.Context) -> None:
     """Let the view, where there is one, show the colours of attributes."""
-    space = context.space_data
-    if space is None or space.type != 'VIEW_3D':
+    shading, screen = _shading(context), context.screen
+    if shading is None or screen is None:
         return
-    shading = space.shading
     if (shading.type, shading.color_type) != ('SOLID', 'VERTEX'):
-        context.screen[_SHADING] = [shading.type, shading.color_type]
+        screen[_SHADING] = [shading.type, shading.color_type]
     shading.type = 'SOLID'
     shading.color_type = 'VERTEX'
 
 
 def leave(context: bpy.types.Context) -> None:
     """Let the view show what it showed before."""
-    space = context.space_data
-    if space is None or space.type != 'VIEW_3D' or _SHADING not in context.screen:
+    shading, screen = _shading(context), context.screen
+    if shading is None or screen is None or not id_properties.has(screen, _SHADING):
         return
-    before = context.screen.pop(_SHADING)
-    shading = space.shading
+    before = screen.pop(_SHADING)
     shading.type = 'SOLID'
     with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` kept: the view then stays in Solid
         kind, colours = before
         shading.color_type = colours
         shading.type = kind
+
+
+def _shading(context: bpy.types.Context) -> bpy.types.View3DShading | None:
+    """How the view shows things, where there is a 3D view."""
+    space = context.space_data
+    if space is None or space.type != 'VIEW_3D':
+        return None
+    return cast(bpy.types.SpaceView3D, space).shading
 
 
 def register() -> None:
@@ -57,10 +66,13 @@ def unregister() -> None:
 
 def _draw() -> None:
     state = heat_map.shown(bpy.context.active_object)
-    if state is None or not bpy.context.space_data.overlay.show_overlays:
+    if state is None:
+        return
+    view = expect(bpy.types.SpaceView3D, bpy.context.space_data)
+    if not present(view.overlay).show_overlays:
         return
     scale = state.scale
-    size = bpy.context.preferences.system.ui_scale
+    size = present(bpy.context.preferences).system.ui_scale
     _draw_bar(scale, size)
     _draw_texts(scale, size)
 
@@ -88,7 +100,7 @@ def _draw_texts(scale: Scale, size: float) -> None:
     blf.color(font, 0.95, 0.95, 0.95, 1.0)
     blf.enable(font, blf.SHADOW)
     blf.shadow(font, 3, 0.0, 0.0, 0.0, 0.8)
-    texts = [(_MARGIN + place * _WIDTH, _MARGIN, text, place) for place, text in scale.ticks]
+    texts = [(_MARGIN + place * _WIDTH, float(_MARGIN), text, place) for place, text in scale.ticks]
     texts.append((_MARGIN, _MARGIN + _TEXT * 1.5 + _HEIGHT + 6, scale.title, 0.0))
     for x, y, text, part in texts:
         width, _ = blf.dimensions(font, text)

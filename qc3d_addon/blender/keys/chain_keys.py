@@ -9,6 +9,8 @@ from collections.abc import Iterator
 import bpy
 
 from ...solver.errors import InputError
+from ..kinds import keys_of, present
+from ..store.id_properties import has
 from ..store.records import Chain
 from . import drivers
 from .control import Control, path_of, value_path
@@ -32,7 +34,9 @@ def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKe
     recorded = set(owned.values())
     others = [key for key in keys.key_blocks if key not in recorded and value_path(key.name) in curves]
     weights = chain.weights if missing and others else None
-    for step in missing if weights is not None else ():
+    for step in missing:
+        if weights is None:
+            break
         renamed = [key for key in others if drivers.shows(curves[value_path(key.name)], weights, step)]
         if len(renamed) == 1:
             owned[step] = renamed[0]
@@ -53,12 +57,17 @@ def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
     The slider is that on the object of an earlier bake (objects may share a mesh), else that on ``obj``.
     """
     if chain.on_key:
-        return Control(obj.data.shape_keys, chain.on_key)
-    for driver in _drivers(obj.data.shape_keys, chain):
+        return Control(keys_of(obj), chain.on_key)
+    for driver in _drivers(keys_of(obj), chain):
         owner = driver.variables[0].targets[0].id
-        if isinstance(owner, bpy.types.Object):
+        if isinstance(owner, bpy.types.Object) and not is_original(obj, owner, chain):
             return Control(owner, chain.slider)
     return Control(obj, chain.slider)
+
+
+def is_original(obj: bpy.types.Object, owner: bpy.types.Object, chain: Chain) -> bool:
+    """Whether ``owner`` is only what ``obj`` was copied from: a script copies the slider, but not what reads it."""
+    return owner.type == 'MESH' and owner.data != obj.data and has(owner, chain.slider) and has(obj, chain.slider)
 
 
 def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
@@ -70,7 +79,7 @@ def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
 def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
     """Start drivers again that Blender has stopped."""
     for curve in drivers.driven_by(keys, path_of(chain)).values():
-        curve.driver.is_valid = True
+        present(curve.driver).is_valid = True
     keys.update_tag()
 
 
@@ -81,7 +90,7 @@ def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
         driver = drivers.driver_of(keys, name, path)
         if driver is not None:
             yield driver
-    yield from (curve.driver for curve in drivers.driven_by(keys, path).values())
+    yield from (present(curve.driver) for curve in drivers.driven_by(keys, path).values())
 
 
 def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import QC3DError
+from ..kinds import keys_of, mesh_of
 from ..store.mesh_data import key_coordinates, shown_coordinates
 from ..store.records import Chain
 from .chain_keys import all_owned_keys, base_key
@@ -37,7 +38,7 @@ def shapes_by_step(
     """
     shapes = dict(enumerate(_rounded(obj, frames)))
     for step, name in met.items():
-        if name == obj.data.shape_keys.reference_key.name:
+        if name == keys_of(obj).reference_key.name:
             del shapes[step]
         else:
             shapes[step] = shown_coordinates(obj, name)
@@ -78,7 +79,7 @@ def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
     InputError
         If keys of the chain are missing.
     """
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     owned = all_owned_keys(keys, chain)
     first = key_coordinates(obj, base_key(keys, chain).name).astype(np.float64)
     # What the key itself adds where its own value plays the chain.
@@ -93,9 +94,9 @@ def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
 
 def _rounded(obj: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float32]:
     """Frames (k, n, 3) as shape keys hold them; raises QC3DError where they cannot."""
-    if frames.ndim != 3 or frames.shape[1:] != (len(obj.data.vertices), 3):
+    if frames.ndim != 3 or frames.shape[1:] != (len(mesh_of(obj).vertices), 3):
         raise QC3DError(
-            f"The in-betweens have shape {frames.shape} for {len(obj.data.vertices)} vertices; please report this."
+            f"The in-betweens have shape {frames.shape} for {len(mesh_of(obj).vertices)} vertices; please report this."
         )
     with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
         rounded = frames.astype(np.float32)

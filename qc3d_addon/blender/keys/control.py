@@ -8,11 +8,12 @@ It is the value of a key that the user has, whose control then plays the arc, or
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import bpy
 
 from ...solver.errors import InputError
+from ..store import id_properties
 from ..store.records import Chain
 
 
@@ -27,7 +28,7 @@ class Control(NamedTuple):
         What it is called there.
     """
 
-    owner: bpy.types.ID
+    owner: bpy.types.Object | bpy.types.Key
     name: str
 
     @property
@@ -41,24 +42,30 @@ class Control(NamedTuple):
         return value_path(self.name) if self.is_key else slider_path(self.name)
 
     @property
-    def id_type(self) -> str:
+    def id_type(self) -> Literal['KEY', 'OBJECT']:
         """The type of its owner, as drivers name it."""
         return 'KEY' if self.is_key else 'OBJECT'
 
     @property
     def is_there(self) -> bool:
         """Whether its owner has it."""
-        return self.name in (self.owner.key_blocks if self.is_key else self.owner)
+        if isinstance(self.owner, bpy.types.Key):
+            return self.name in self.owner.key_blocks
+        return id_properties.has(self.owner, self.name)
 
     @property
     def value(self) -> float:
         """Where it is; the control must have no ``problem``."""
-        return float(self.owner.key_blocks[self.name].value if self.is_key else self.owner[self.name])
+        if isinstance(self.owner, bpy.types.Key):
+            return float(self.owner.key_blocks[self.name].value)
+        return float(self.owner[self.name])
 
     @property
     def shown(self) -> tuple[bpy.types.bpy_struct, str]:
         """What has it and as which property, for a panel to draw."""
-        return (self.owner.key_blocks[self.name], "value") if self.is_key else (self.owner, self.path)
+        if isinstance(self.owner, bpy.types.Key):
+            return self.owner.key_blocks[self.name], "value"
+        return self.owner, self.path
 
     @property
     def problem(self) -> str | None:
@@ -90,7 +97,7 @@ class Control(NamedTuple):
 
     def put(self, value: float) -> str | None:
         """Set it, or say why it stays where it is."""
-        if self.is_key:
+        if isinstance(self.owner, bpy.types.Key):
             animation = self.owner.animation_data
             if animation is not None and animation.drivers.find(self.path) is not None:
                 return f"Key '{self.name}' is driven and stays where it is."
@@ -102,7 +109,7 @@ class Control(NamedTuple):
         self.owner.update_tag()
         return None
 
-    def of(self, owner: bpy.types.ID) -> Control:
+    def of(self, owner: bpy.types.Object | bpy.types.Key) -> Control:
         """The same control of another data block, such as a copy."""
         return self._replace(owner=owner)
 
@@ -119,13 +126,14 @@ def slider_path(name: str) -> str:
 
 def value_path(key_name: str) -> str:
     """The path of a shape key's value from its data block."""
-    return _key_path(key_name, "value")
+    return f"{key_path(key_name)}value"
 
 
 def mute_path(key_name: str) -> str:
     """The path of whether a shape key is muted, from its data block."""
-    return _key_path(key_name, "mute")
+    return f"{key_path(key_name)}mute"
 
 
-def _key_path(key_name: str, what: str) -> str:
-    return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].{what}'
+def key_path(key_name: str) -> str:
+    """What the paths of all properties of a shape key begin with."""
+    return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].'

@@ -9,6 +9,8 @@ cubic polynomial with these slopes (Farin 2002, *Curves and Surfaces for CAGD*, 
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import bpy
@@ -16,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import compat
-from .control import Control, mute_path, value_path
+from ..kinds import expect, present
+from .control import Control, key_path, mute_path, value_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -31,13 +34,13 @@ _CLOSE = 1e-4  # of values and places in curves: single precision, which users d
 
 def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, step: int) -> None:
     """Let the value of a shape key be the weight of a step, by its driver, which is made where there is none."""
-    keys, path = key.id_data, value_path(key.name)
+    keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
     if curve is None:
         curve = compat.new_driver(keys, path)
     knots, values, slopes = _function(weights, step)
     stretch = _stretch(weights.knots)
-    read(curve.driver, control, stretch)
+    read(present(curve.driver), control, stretch)
     knots, slopes = knots * stretch, slopes / stretch
     width = np.diff(knots) / 3.0
     before, after = np.append(width[0], width), np.append(width, width[-1])
@@ -49,17 +52,17 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
 
 def drive_mute(key: bpy.types.ShapeKey, control: Control) -> None:
     """Let a key be muted together with the one that plays it."""
-    keys, path = key.id_data, mute_path(key.name)
+    keys, path = expect(bpy.types.Key, key.id_data), mute_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
     if curve is None:
         curve = compat.new_driver(keys, path)
-    _read_path(curve.driver, control, mute_path(control.name))
+    _read_path(present(curve.driver), control, mute_path(control.name))
 
 
 def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike, values: ArrayLike) -> None:
     """Let a new driver go straight through values (k,) at places (k,) of the control, and stay at them at the ends."""
     stretch = _stretch(np.asarray(places))
-    read(curve.driver, control, stretch)
+    read(present(curve.driver), control, stretch)
     points = np.column_stack([np.asarray(places) * stretch, values])
     _set_curve(curve, points, points, points, 'LINEAR')
     curve.extrapolation = 'CONSTANT'
@@ -90,7 +93,7 @@ def _read_path(driver: bpy.types.Driver, control: Control, path: str) -> None:
 
 def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
     """Whether a driver of this curve gives the weight of a step, as a bake of this or an earlier version made it."""
-    if curve.driver.expression == _earlier_expression(step, len(weights.knots) - 1):
+    if present(curve.driver).expression == _earlier_expression(step, len(weights.knots) - 1):
         return True
     knots, values, _ = _function(weights, step)
     points = np.empty(2 * len(curve.keyframe_points))
@@ -100,11 +103,39 @@ def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
 
 
 def undrive(key: bpy.types.ShapeKey) -> None:
-    """Remove the drivers of a shape key, if it has any."""
-    keys = key.id_data
-    for path in (value_path(key.name), mute_path(key.name)):
-        if keys.animation_data is not None and keys.animation_data.drivers.find(path) is not None:
-            keys.driver_remove(path)
+    """Remove all drivers of a shape key."""
+    keys, path = expect(bpy.types.Key, key.id_data), key_path(key.name)
+    if keys.animation_data is not None:
+        for driven in [curve.data_path for curve in keys.animation_data.drivers if curve.data_path.startswith(path)]:
+            keys.driver_remove(driven)
+
+
+def paths_read(keys: bpy.types.Key) -> Counter[str]:
+    """How often drivers of the file read properties of shape keys, by path."""
+    return Counter(
+        target.data_path
+        for curve in all_drivers()
+        for variable in present(curve.driver).variables
+        for target in variable.targets
+        if target.id == keys
+    )
+
+
+def all_drivers() -> Iterator[bpy.types.FCurve]:
+    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
+    for collection in bpy.data.bl_rna.properties:
+        if collection.type != 'COLLECTION':
+            continue
+        for block in getattr(bpy.data, collection.identifier):
+            owner = block.user if isinstance(block, bpy.types.Key) else block
+            if owner is None or not owner.users:
+                continue
+            animation = getattr(block, "animation_data", None)
+            if animation is not None:
+                yield from animation.drivers
+            tree = getattr(block, "node_tree", None)
+            if tree is not None and tree.animation_data is not None:
+                yield from tree.animation_data.drivers
 
 
 def driver_of(keys: bpy.types.Key, key_name: str, path: str) -> bpy.types.Driver | None:
@@ -120,9 +151,9 @@ def driven_by(keys: bpy.types.Key, path: str) -> dict[str, bpy.types.FCurve]:
     return {curve.data_path: curve for curve in keys.animation_data.drivers if _reads_alone(curve.driver, path)}
 
 
-def reads(driver: bpy.types.Driver, control: Control) -> bool:
+def reads(driver: bpy.types.Driver | None, control: Control) -> bool:
     """Whether a driver of any kind reads the control."""
-    return any(
+    return driver is not None and any(
         target.id == control.owner and target.data_path == control.path
         for variable in driver.variables
         for target in variable.targets
@@ -160,13 +191,15 @@ def _set_curve(
     frames.add(len(points))
     kinds = bpy.types.Keyframe.bl_rna.properties
     for name, kind in (("interpolation", interpolation), ("handle_left_type", 'FREE'), ("handle_right_type", 'FREE')):
-        frames.foreach_set(name, [kinds[name].enum_items[kind].value] * len(points))
+        frames.foreach_set(name, [expect(bpy.types.EnumProperty, kinds[name]).enum_items[kind].value] * len(points))
     for name, places in (("co", points), ("handle_left", left), ("handle_right", right)):
         frames.foreach_set(name, places.ravel())
     curve.update()
 
 
-def _reads_alone(driver: bpy.types.Driver, path: str) -> bool:
+def _reads_alone(driver: bpy.types.Driver | None, path: str) -> bool:
+    if driver is None:
+        return False
     variables = driver.variables
     return (
         len(variables) == 1

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from .. import compat
+from ..kinds import keys_of
 from ..store import names
 from ..store.mesh_data import key_coordinates, set_key_coordinates
 from ..store.records import LEAST_DISTANCE, Chain
 from . import drivers, slider
 from .chain_keys import base_key, control_of, owned_keys
-from .control import Control
+from .control import Control, key_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
@@ -37,10 +39,9 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
     Raises
     ------
     InputError
-        If a key that the bake replaces is locked, the slider is not a number any more, or its object or its action is
-        linked.
+        If the slider is not a number any more, or its object or its action is linked.
     """
-    control = _require_unlocked(obj, chain)
+    control = _require_local(obj, chain)
     if control.is_there:
         control.require()
     if keyframes is not None:
@@ -55,23 +56,23 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
     InputError
         If a key is locked, or the slider's object or its action is linked.
     """
-    control = _require_unlocked(obj, chain)
+    for key in owned_keys(keys_of(obj), chain).values():
+        if key.lock_shape:
+            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
+    control = _require_local(obj, chain)
     if chain.keyframes is not None:
         require_action(control.owner)
     return control
 
 
-def require_action(block: bpy.types.ID) -> None:
+def require_action(block: compat.Animated) -> None:
     """Raise InputError where the keyframes of an object or of shape keys cannot be changed."""
     action = block.animation_data and block.animation_data.action
     if action and (action.library or action.override_library):
         raise InputError(f"The action '{action.name}' is linked; make it local first.")
 
 
-def _require_unlocked(obj: bpy.types.Object, chain: Chain) -> Control:
-    for key in owned_keys(obj.data.shape_keys, chain).values():
-        if key.lock_shape:
-            raise InputError(f"Shape key '{key.name}' of an earlier bake is locked; unlock it first.")
+def _require_local(obj: bpy.types.Object, chain: Chain) -> Control:
     control = control_of(obj, chain)
     if control.owner.library is not None:
         name = control.owner.name
@@ -115,16 +116,17 @@ def chain_written(
         If a key or action cannot be written, or the slider is not a number any more.
     """
     require_writable(obj, chain, keyframes)
-    keys, control = obj.data.shape_keys, control_of(obj, chain)
+    keys, control = keys_of(obj), control_of(obj, chain)
     base = base_key(keys, chain)
     owned = owned_keys(keys, chain)
     kept = _kept(chain, owned, steps.places, shapes)
     stale = [key for key in owned.values() if key not in kept.values()]
     active = obj.active_shape_key
-    curve, notes = None, []
+    curve: bpy.types.FCurve | None = None
+    notes: list[str] = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
-        if not control.is_key:
+        if isinstance(control.owner, bpy.types.Object):
             # A slider that starts where it shows the Basis leaves the object looking as it did.
             start = min(set(range(len(steps.places))) - shapes.keys(), default=0)
             slider.ensure_property(control.owner, chain.slider, steps.places[start], undo)
@@ -139,7 +141,7 @@ def chain_written(
             undo.callback(setattr, key, "relative_key", key.relative_key)
             key.relative_key = base  # another one may have been moved to the top
         for step in sorted(shapes.keys() - kept.keys()):
-            written[step] = _new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
+            written[step] = new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
             if control.is_key:
@@ -152,7 +154,7 @@ def chain_written(
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
     _let_play(kept, control, weights)
-    if curve is not None:
+    if curve is not None and keyframes is not None:
         slider.set_keyframes(curve, keyframes)
     remove_keys(obj, stale)
 
@@ -180,13 +182,28 @@ def _kept(
     }
 
 
-def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> None:
-    """Remove shape keys with their drivers; the active key stays active where it is not one of them."""
+def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[str]:
+    """Remove shape keys with their drivers; the active key stays active where it is not one of them.
+
+    Returns
+    -------
+    Sentences about keys that stay, switched off, since drivers of the user read them.
+    """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
+    notes = []
+    read = drivers.paths_read(keys_of(obj)) if stale else {}
     for key in stale:
-        _remove_key(obj, key)
+        readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
+        if readers:
+            drivers.undrive(key)
+            key.value = 0.0
+            what = "driver reads" if readers == 1 else "drivers read"
+            notes.append(f"Key '{key.name}' stays, switched off, since {readers} {what} it.")
+        else:
+            _remove_key(obj, key)
     _activate(obj, active)
-    obj.data.shape_keys.update_tag()
+    keys_of(obj).update_tag()
+    return notes
 
 
 def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
@@ -196,7 +213,8 @@ def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
     _activate(obj, active)
 
 
-def _new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: ExitStack) -> bpy.types.ShapeKey:
+def new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: ExitStack) -> bpy.types.ShapeKey:
+    """A key relative to another one, at 0, whose value may leave 0 to 1; closing ``undo`` removes it."""
     key = obj.shape_key_add(name=name, from_mix=False)
     undo.callback(_remove_key, obj, key)
     key.value = 0.0  # Blender 5 starts with 1
@@ -218,4 +236,4 @@ def _remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
 
 
 def _activate(obj: bpy.types.Object, key: bpy.types.ShapeKey | None) -> None:
-    obj.active_shape_key_index = 0 if key is None else obj.data.shape_keys.key_blocks.find(key.name)
+    obj.active_shape_key_index = 0 if key is None else keys_of(obj).key_blocks.find(key.name)

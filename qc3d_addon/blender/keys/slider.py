@@ -9,21 +9,25 @@ slider thus shows the first key from the moment of the bake on. What other keys 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
+from typing import Any
 
 import bpy
 
 from .. import compat
+from ..store import id_properties
 from ..store.records import Chain
 from .control import Control, slider_path
 
 
 def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitStack) -> None:
     """Give ``obj`` the slider; one that is there keeps its value. Closing ``undo`` takes a new one away."""
-    if name not in obj:
+    if not id_properties.has(obj, name):
         undo.callback(obj.pop, name, None)
         obj[name] = start
-        obj.id_properties_ui(name).update(
+        interface: Callable[[str], Any] = obj.id_properties_ui  # the stubs say that it returns nothing
+        interface(name).update(
             min=-1.0,
             max=2.0,
             soft_min=0.0,
@@ -54,6 +58,9 @@ def begin_keyframes(
             return None, [f"The {what} is animated already; its keyframes were left as they are."]
         if chain.keyframes == wanted:
             return None, []
+        made = [*zip(chain.keyframes, (0.0, 1.0), strict=True)]
+        if [(point.co.x, point.co.y) for point in existing.keyframe_points] != made:
+            return None, [f"The keyframes of the {what} were edited, and left as they are."]
     return compat.ensure_fcurve(owner, path, undo), []
 
 

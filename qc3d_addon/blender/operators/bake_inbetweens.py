@@ -4,13 +4,17 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.props import BoolProperty
 
 from .. import live_scrub
 from ..bake.plan import Plan, plan_bake, request_again, write_bake
-from ..properties import BakeChoices, bake_request, fill_from_panel
+from ..bake.together import objects_with_keys, plan_together, write_together
+from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..store import checks
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
 
@@ -29,8 +33,8 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
         return poll_active_object(cls, context) and poll_panel_keys(cls, context)
 
     def plan(self, context: bpy.types.Context) -> Plan:
-        obj = context.active_object
-        fill_from_panel(self.properties, obj.qc3d)
+        obj = checks.require_object(context.active_object)
+        fill_from_panel(self.properties, settings_of(obj))
         return plan_bake(obj, bake_request(self))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
@@ -60,3 +64,44 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         live_scrub.end()
         result = write_bake(plan, outcome)
         return [*result.notes, result.summary()]
+
+
+class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
+    """Bake the selected objects that have these shape keys as one: lashes stay on lids, clothes on skin"""
+
+    bl_idname = "qc3d.bake_objects"
+    bl_label = "Bake Selected Objects Together"
+
+    if TYPE_CHECKING:
+        one_control: bool
+    else:
+        one_control: BoolProperty(
+            name="One Control",
+            description="What plays the in-betweens of the active object drives those of the others, "
+            "where nothing else drives them",
+            default=True,
+            options={'SKIP_SAVE'},
+        )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context) and poll_panel_keys(cls, context)
+
+    def plan(self, context: bpy.types.Context) -> Plan:
+        active = checks.require_object(context.active_object)
+        fill_from_panel(self.properties, settings_of(active))
+        request = bake_request(self)
+        others = [obj for obj in context.selected_objects if obj != active and obj.type == 'MESH']
+        chosen = objects_with_keys(active, others, request.keys)
+        self._left_out = [obj.name for obj in others if obj not in chosen]
+        self._joint = plan_together(chosen, request)
+        return replace(self._joint.plans[0], task=self._joint.task)
+
+    def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        live_scrub.end()
+        results = write_together(self._joint, outcome, self.one_control)
+        notes = list(dict.fromkeys(note for result in results for note in result.notes))
+        if self._left_out:
+            names = ", ".join(f"'{name}'" for name in self._left_out)
+            notes.append(f"Left out, since not all of these keys are there, or their mesh is baked already: {names}.")
+        return [*notes, f"{len(results)} objects baked together. {results[0].summary()}"]

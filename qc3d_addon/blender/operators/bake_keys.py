@@ -13,9 +13,11 @@ from ...solver.errors import QC3DError
 from .. import live_scrub
 from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
 from ..bake.plan import Plan
-from ..properties import BakeChoices, bake_request, fill_from_panel
+from ..kinds import keys_of, present
+from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..store import checks
 from .child_work import ChildWork
-from .common import poll_active_object
+from .common import Status, poll_active_object
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -24,7 +26,10 @@ if TYPE_CHECKING:
 class KeyChoice(bpy.types.PropertyGroup):
     """A key with a tick, by its name."""
 
-    use: BoolProperty(name="Bake", description="Bake in-betweens on this key", default=True)
+    if TYPE_CHECKING:
+        use: bool
+    else:
+        use: BoolProperty(name="Bake", description="Bake in-betweens on this key", default=True)
 
 
 class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
@@ -33,26 +38,31 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
     bl_idname = "qc3d.bake_keys"
     bl_label = "Bake Keys"
 
-    which: EnumProperty(
-        name="Keys",
-        description="The keys to bake",
-        items=[
-            ("all", "All", "Every key but the Basis and what was baked"),
-            ("selected", "Selected", "Those selected in the list of shape keys, from Blender 5 on; else asks"),
-            ("named", "Named", "Those with a tick among the operator's keys"),
-        ],
-        default="all",
-        options={'SKIP_SAVE'},
-    )
-    keys: CollectionProperty(
-        name="Keys", description="Keys to bake, as [{\"name\": key}, …]", type=KeyChoice, options={'SKIP_SAVE'}
-    )
+    if TYPE_CHECKING:
+        which: str
+        # In place of the names of an operator's own custom properties, which it has none of.
+        keys: "bpy.types.bpy_prop_collection_idprop[KeyChoice]"  # type: ignore[assignment]
+    else:
+        which: EnumProperty(
+            name="Keys",
+            description="The keys to bake",
+            items=[
+                ("all", "All", "Every key but the Basis and what was baked"),
+                ("selected", "Selected", "Those selected in the list of shape keys, from Blender 5 on; else asks"),
+                ("named", "Named", "Those with a tick among the operator's keys"),
+            ],
+            default="all",
+            options={'SKIP_SAVE'},
+        )
+        keys: CollectionProperty(
+            name="Keys", description="Keys to bake, as [{\"name\": key}, …]", type=KeyChoice, options={'SKIP_SAVE'}
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         self._asks = self.which == "selected" and not _can_select() and not bpy.app.background
         if not self._asks:
             return super().invoke(context, event)
@@ -60,14 +70,14 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
         for name in bakeable_keys(context.active_object):
             self.keys.add().name = name
         self.which = "named"
-        return set(context.window_manager.invoke_props_dialog(self))
+        return set(present(context.window_manager).invoke_props_dialog(self))
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
+        column = present(self.layout).column()
         for key in self.keys:
             column.prop(key, "use", text=key.name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         if getattr(self, "_asks", False):  # the list was confirmed
             return self._guarded(context, lambda: self._begin(context, self.plan(context)))
         return super().execute(context)
@@ -77,8 +87,8 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
         return (self._number, max(len(self._names), 1))
 
     def plan(self, context: bpy.types.Context) -> Plan | None:
-        obj = context.active_object
-        fill_from_panel(self.properties, obj.qc3d)
+        obj = checks.require_object(context.active_object)
+        fill_from_panel(self.properties, settings_of(obj))
         self._choices = bake_request(self, ("", ""))
         self._names = require_own_keys(obj, self._chosen(obj))
         self._number = -1
@@ -112,7 +122,7 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
         known = bakeable_keys(obj)
         if self.which == "all":
             return known
-        return [name for name in known if getattr(obj.data.shape_keys.key_blocks[name], "select", False)]
+        return [name for name in known if getattr(keys_of(obj).key_blocks[name], "select", False)]
 
 
 def _can_select() -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 
 from ..bake import jobs
+from .common import Status
 
 
 class QC3D_OT_cancel(bpy.types.Operator):
@@ -14,7 +15,7 @@ class QC3D_OT_cancel(bpy.types.Operator):
 
     bl_idname = "qc3d.cancel"
     bl_label = "Cancel"
-    bl_options = {'INTERNAL'}  # noqa: RUF012 - Blender reads it from the class
+    bl_options = {'INTERNAL'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -23,6 +24,6 @@ class QC3D_OT_cancel(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         jobs.cancel()
         return {'FINISHED'}

@@ -5,36 +5,41 @@
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
 from .. import live_scrub
-from ..chains import absolute_copy, alembic, keyframes, mirror, remove
+from ..chains import absolute_copy, alembic, keyframes, mirror, remove, to_key
+from ..kinds import keys_of, present
+from ..store import checks
 from ..store.records import Chain, Record
-from .common import SLIDER, chosen_chain, poll_chains
+from .common import SLIDER, OperatorMixin, Status, chosen_chain, poll_chains
 
 _MOST_FRAMES = 100_000
 
 
-class ChainWork:
+class ChainWork(OperatorMixin):
     """Does something with the chosen chain at once; an operator says what by ``work``."""
 
-    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+    bl_options = {'REGISTER', 'UNDO'}
+
+    if TYPE_CHECKING:  # the operators' own: Blender 4.2 crashes where a class inherits both properties and methods
+        slider: str
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
         """Do it; sentences for the user, the last of them what was done. Raises QC3DError with nothing changed."""
         raise NotImplementedError
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         live_scrub.end()
-        obj = context.active_object
         try:
+            obj = checks.require_object(context.active_object)
             slider = chosen_chain(obj, self.slider).slider
-            record = Record.read(obj.data.shape_keys)
-            chain = record.chain_of_slider(slider)
+            record = Record.read(keys_of(obj))
+            chain = present(record.chain_of_slider(slider))
             *notes, done = self.work(context, obj, record, chain)
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
@@ -62,17 +67,41 @@ class QC3D_OT_remove(ChainWork, bpy.types.Operator):
         return [*notes, f"The in-betweens of '{chain.slider}' were removed."]
 
 
+class QC3D_OT_play_on_key(ChainWork, bpy.types.Operator):
+    """Let the last key's own value play these in-betweens, in place of their slider"""
+
+    bl_idname = "qc3d.play_on_key"
+    bl_label = "Play on the Key"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
+        moved, notes = to_key.play_on_key(obj, record, chain)
+        return [*notes, f"The value of '{moved.on_key}' plays the in-betweens."]
+
+
 class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
     """Turn what the slider does over a range of frames into keyframes of the shape keys, without drivers"""
 
     bl_idname = "qc3d.to_keyframes"
     bl_label = "Bake to Keyframes"
 
-    slider: SLIDER
-    frame_start: IntProperty(
-        name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
-    )
-    frame_end: IntProperty(name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'})
+    if TYPE_CHECKING:
+        slider: SLIDER
+        frame_start: int
+        frame_end: int
+    else:
+        slider: SLIDER
+        frame_start: IntProperty(
+            name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
+        )
+        frame_end: IntProperty(
+            name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'}
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -113,15 +142,25 @@ class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
     bl_idname = "qc3d.mirror"
     bl_label = "Mirror"
 
-    slider: SLIDER
+    if TYPE_CHECKING:
+        slider: SLIDER
+        use_topology: bool
+    else:
+        slider: SLIDER
+        use_topology: BoolProperty(
+            name="Topology",
+            description="Find the mirror images of vertices also by how the mesh is built, where places do not tell",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        mirrored = mirror.mirror_chain(obj, record, chain)
-        return [f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
+        mirrored, notes = mirror.mirror_chain(obj, record, chain, self.use_topology)
+        return [*notes, f"The slider '{mirrored.slider}' plays the mirror image of '{chain.slider}'."]
 
 
 class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
@@ -129,23 +168,30 @@ class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
 
     bl_idname = "qc3d.export_alembic"
     bl_label = "Export Alembic"
-    bl_options: ClassVar[set[str]] = {'REGISTER'}  # nothing in the file changes
+    bl_options = {'REGISTER'}  # nothing in the file changes
 
-    slider: SLIDER
-    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
-    check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
-    filter_glob: StringProperty(default="*.abc", options={'HIDDEN', 'SKIP_SAVE'})
-    frames: IntProperty(
-        name="Frames", description="Frames from the first key to the last", default=25, min=2, max=_MOST_FRAMES
-    )
+    if TYPE_CHECKING:
+        slider: SLIDER
+        filepath: str
+        check_existing: bool
+        filter_glob: str
+        frames: int
+    else:
+        slider: SLIDER
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        filter_glob: StringProperty(default="*.abc", options={'HIDDEN', 'SKIP_SAVE'})
+        frames: IntProperty(
+            name="Frames", description="Frames from the first key to the last", default=25, min=2, max=_MOST_FRAMES
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{bpy.path.clean_name(context.active_object.name)}.abc"
-        context.window_manager.fileselect_add(self)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        self.filepath = f"{bpy.path.clean_name(present(context.active_object).name)}.abc"
+        present(context.window_manager).fileselect_add(self)
         return {'RUNNING_MODAL'}
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:

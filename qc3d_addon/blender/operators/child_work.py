@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 
@@ -14,6 +14,8 @@ from ...solver.errors import QC3DError
 from .. import compat, preferences
 from ..bake import jobs, progress_bar
 from ..bake.plan import Plan
+from ..kinds import present
+from .common import OperatorMixin, Status
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 _TICK = 0.05  # seconds between looks at the child process
 
 
-class ChildWork:
+class ChildWork(OperatorMixin):
     """Plan the work, let a child process do it, write its outcome; an operator says how by ``plan`` and ``write``.
 
     One that has several plans names the next by ``following``, and writes all by ``write_all``.
@@ -31,7 +33,7 @@ class ChildWork:
     Nothing is written unless all of the work was done.
     """
 
-    bl_options: ClassVar[set[str]] = {'UNDO'}  # no panel to adjust it: each change would run it all again
+    bl_options = {'UNDO'}  # no panel to adjust it: each change would run it all again
 
     def plan(self, context: bpy.types.Context) -> Plan | None:
         """What to compute, None where nothing is to be; raises QC3DError where it cannot be done."""
@@ -58,10 +60,10 @@ class ChildWork:
         assert outcome is not None
         return self.write(plan, outcome)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         from ...worker import client
 
-        manager = context.window_manager
+        manager = present(context.window_manager)
         try:
             problem = jobs.busy_problem()
             if problem is not None:
@@ -94,12 +96,12 @@ class ChildWork:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         return self._guarded(context, lambda: self._begin(context, self.plan(context)))
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         if event.type == 'ESC' and event.value == 'PRESS':
             jobs.cancel()
         if self._job.is_cancelled:
@@ -109,7 +111,7 @@ class ChildWork:
             return {'PASS_THROUGH'}
         return self._guarded(context, lambda: self._step(context))
 
-    def _guarded(self, context: bpy.types.Context, work: Callable[[], set[str]]) -> set[str]:
+    def _guarded(self, context: bpy.types.Context, work: Callable[[], Status]) -> Status:
         """Do a part of the work; where it cannot be done, say why and leave nothing running."""
         try:
             return work()
@@ -121,7 +123,7 @@ class ChildWork:
             jobs.end()  # else no other could ever start
             raise
 
-    def _begin(self, context: bpy.types.Context, plan: Plan | None) -> set[str]:
+    def _begin(self, context: bpy.types.Context, plan: Plan | None) -> Status:
         """Start the work of the first plan."""
         if plan is None:
             return self._finish(self.write_all(None, None))
@@ -130,17 +132,17 @@ class ChildWork:
             self.report({'ERROR'}, problem)
             return {'CANCELLED'}
         self._start(context, plan)
-        context.window_manager.modal_handler_add(self)
+        present(context.window_manager).modal_handler_add(self)
         self._show(context)
         return {'RUNNING_MODAL'}
 
     def _start(self, context: bpy.types.Context, plan: Plan) -> None:
         self._plan = plan
         self._job = jobs.begin(self.bl_label, plan.task, preferences.limits(context), *self.part)
-        timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        timer = present(context.window_manager).event_timer_add(_TICK, window=context.window)
         self._job.at_end(partial(_leave_window, timer))
 
-    def _step(self, context: bpy.types.Context) -> set[str]:
+    def _step(self, context: bpy.types.Context) -> Status:
         """Look at the child process; go on with the next plan, or to the end."""
         outcome: Outcome | QC3DError | None
         try:
@@ -161,7 +163,7 @@ class ChildWork:
         """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
         jobs.cancel()
 
-    def _finish(self, sentences: list[str]) -> set[str]:
+    def _finish(self, sentences: list[str]) -> Status:
         *notes, summary = sentences
         for note in notes:
             self.report({'WARNING'}, note)
@@ -183,5 +185,5 @@ def raise_input(problem: str) -> None:
 
 
 def _leave_window(timer: bpy.types.Timer) -> None:
-    bpy.context.window_manager.event_timer_remove(timer)
+    present(bpy.context.window_manager).event_timer_remove(timer)
     progress_bar.clear()

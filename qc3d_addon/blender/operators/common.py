@@ -4,18 +4,29 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 import bpy
 from bpy.props import StringProperty
 
 from ...solver.errors import InputError
 from ..bake import jobs
-from ..properties import key_names
+from ..kinds import keys_of, present
+from ..properties import key_names, settings_of
 from ..store import checks
 from ..store.records import Chain, Record
 
-SLIDER = StringProperty(
-    name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
-)
+# What an operator says of itself when it ends, or goes on.
+Status = set[Literal['RUNNING_MODAL', 'CANCELLED', 'FINISHED', 'PASS_THROUGH', 'INTERFACE']]
+
+if TYPE_CHECKING:
+    SLIDER = str
+    OperatorMixin = bpy.types.Operator  # to mypy what operators share is an operator; to Blender each of them is
+else:
+    SLIDER = StringProperty(
+        name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
+    )
+    OperatorMixin = object
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -27,15 +38,15 @@ def poll_panel_keys(operator: type[bpy.types.Operator], context: bpy.types.Conte
     """Whether the keys that the panel shows can be used; a script, which names its own, is never stopped."""
     if context.region is None or context.region.type != 'UI':
         return True
-    obj = context.active_object
-    return _poll(operator, checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d)))
+    obj = present(context.active_object)
+    return _poll(operator, checks.keys_problem(keys_of(obj), key_names(settings_of(obj))))
 
 
 def poll_chains(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether the active object has in-betweens to work on now."""
     if not poll_active_object(operator, context):
         return False
-    return _poll(operator, checks.chains_problem(context.active_object))
+    return _poll(operator, checks.chains_problem(present(context.active_object)))
 
 
 def chosen_chain(obj: bpy.types.Object | None, slider: str) -> Chain:
@@ -47,7 +58,7 @@ def chosen_chain(obj: bpy.types.Object | None, slider: str) -> Chain:
         If the object has none of that name.
     """
     obj = checks.require_object(obj)
-    chain = Record.read(obj.data.shape_keys).chain_of_slider(slider)
+    chain = Record.read(keys_of(obj)).chain_of_slider(slider)
     if chain is None:
         which = f" with the slider '{slider}'" if slider else ""
         raise InputError(f"'{obj.name}' has no in-betweens{which}; bake some first.")

@@ -7,8 +7,9 @@ from __future__ import annotations
 import bpy
 
 from ..bake import bookkeeping
+from ..kinds import keys_of, present
 from ..store import records
-from .common import poll_active_object
+from .common import Status, poll_active_object
 
 
 class QC3D_OT_forget_record(bpy.types.Operator):
@@ -16,18 +17,18 @@ class QC3D_OT_forget_record(bpy.types.Operator):
 
     bl_idname = "qc3d.forget_record"
     bl_label = "Forget Damaged Record"
-    bl_options = {'UNDO'}  # noqa: RUF012 - Blender reads it from the class
+    bl_options = {'UNDO'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not poll_active_object(cls, context):
             return False
-        is_damaged = records.state(context.active_object.data.shape_keys).is_damaged
+        is_damaged = records.state(keys_of(present(context.active_object))).is_damaged
         if not is_damaged:
             cls.poll_message_set("The record of earlier bakes is not damaged.")
         return is_damaged
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        bookkeeping.forget_all(context.active_object)
+    def execute(self, context: bpy.types.Context) -> Status:
+        bookkeeping.forget_all(present(context.active_object))
         self.report({'INFO'}, "The record is gone; the keys and sliders of earlier bakes are yours now.")
         return {'FINISHED'}

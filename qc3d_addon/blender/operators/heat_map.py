@@ -4,7 +4,7 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -14,9 +14,11 @@ from ...solver.errors import InputError, QC3DError
 from ..heat_map import heat_map, legend
 from ..heat_map.colors import MEASURE_ITEMS
 from ..keys.chain_keys import control_of, owned_keys
+from ..kinds import keys_of, mesh_of, present
+from ..store import checks
 from ..store.records import Chain
 from ..store.summaries import WorstPlace
-from .common import SLIDER, chosen_chain, poll_chains
+from .common import SLIDER, Status, chosen_chain, poll_chains
 
 
 class QC3D_OT_heat_map(bpy.types.Operator):
@@ -24,35 +26,40 @@ class QC3D_OT_heat_map(bpy.types.Operator):
 
     bl_idname = "qc3d.heat_map"
     bl_label = "Heat Map"
-    bl_options: ClassVar[set[str]] = {"UNDO"}
+    bl_options = {"UNDO"}
 
-    slider: SLIDER
-    measure: EnumProperty(
-        name="Measure",
-        description="What the colours show",
-        items=MEASURE_ITEMS,
-        default="stretch",
-        options={"SKIP_SAVE"},
-    )
-    show: EnumProperty(
-        name="Show",
-        description="Whether to show the heat map",
-        items=[
-            ("toggle", "Toggle", "Hide it where it is shown, else show it"),
-            ("on", "On", "Show it"),
-            ("off", "Off", "Hide it"),
-        ],
-        default="toggle",
-        options={"SKIP_SAVE"},
-    )
+    if TYPE_CHECKING:
+        slider: SLIDER
+        measure: str
+        show: str
+    else:
+        slider: SLIDER
+        measure: EnumProperty(
+            name="Measure",
+            description="What the colours show",
+            items=MEASURE_ITEMS,
+            default="stretch",
+            options={"SKIP_SAVE"},
+        )
+        show: EnumProperty(
+            name="Show",
+            description="Whether to show the heat map",
+            items=[
+                ("toggle", "Toggle", "Hide it where it is shown, else show it"),
+                ("on", "On", "Show it"),
+                ("off", "Off", "Hide it"),
+            ],
+            default="toggle",
+            options={"SKIP_SAVE"},
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.active_object
+    def execute(self, context: bpy.types.Context) -> Status:
         try:
+            obj = checks.require_object(context.active_object)
             chain = chosen_chain(obj, self.slider)
             state = heat_map.shown(obj)
             is_same = state is not None and (state.slider, state.measure) == (chain.slider, self.measure)
@@ -73,7 +80,7 @@ class QC3D_OT_select_worst(bpy.types.Operator):
 
     bl_idname = "qc3d.select_worst"
     bl_label = "Select Worst Place"
-    bl_options: ClassVar[set[str]] = {"UNDO"}
+    bl_options = {"UNDO"}
 
     slider: SLIDER
 
@@ -81,29 +88,30 @@ class QC3D_OT_select_worst(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.active_object
+    def execute(self, context: bpy.types.Context) -> Status:
         try:
+            obj = checks.require_object(context.active_object)
             chain = chosen_chain(obj, self.slider)
             worst = _worst_place(obj, chain)
         except QC3DError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        mesh = obj.data
+        mesh, keys = mesh_of(obj), keys_of(obj)
         stays = control_of(obj, chain).put(worst.at)
         if stays is not None:
             self.report({"WARNING"}, stays)
         # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
-        steps = owned_keys(mesh.shape_keys, chain)
+        steps = owned_keys(keys, chain)
         if steps:
             nearest = min(steps, key=lambda step: abs(chain.places[step] - worst.at))
-            obj.active_shape_key_index = mesh.shape_keys.key_blocks.find(steps[nearest].name)
+            obj.active_shape_key_index = keys.key_blocks.find(steps[nearest].name)
         _select(mesh, worst.vertex)
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-        if len(evaluated.data.vertices) == len(mesh.vertices):  # no modifier adds vertices
-            context.scene.cursor.location = evaluated.matrix_world @ evaluated.data.vertices[worst.vertex].co
-        if context.space_data is not None and context.space_data.type == "VIEW_3D":
-            context.space_data.region_3d.view_location = context.scene.cursor.location
+        cursor = present(context.scene).cursor
+        if len(mesh_of(evaluated).vertices) == len(mesh.vertices):  # no modifier adds vertices
+            cursor.location = evaluated.matrix_world @ mesh_of(evaluated).vertices[worst.vertex].co
+        if isinstance(context.space_data, bpy.types.SpaceView3D):
+            present(context.space_data.region_3d).view_location = cursor.location
         self.report({"INFO"}, f"Vertex {worst.vertex} at {worst.at:.2f}: {worst.excess:.1%} beyond the keys.")
         return {"FINISHED"}
 
@@ -111,7 +119,7 @@ class QC3D_OT_select_worst(bpy.types.Operator):
 def _worst_place(obj: bpy.types.Object, chain: Chain) -> WorstPlace:
     """Where to go; raises InputError where that is not known, or the slider cannot go anywhere."""
     worst = None if chain.result is None else chain.result.worst
-    if worst is None or worst.vertex >= len(obj.data.vertices):
+    if worst is None or worst.vertex >= len(mesh_of(obj).vertices):
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")
     control_of(obj, chain).require()
     return worst

@@ -4,12 +4,14 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty
 
-from .common import poll_active_object
+from ..kinds import present
+from ..properties import settings_of
+from .common import Status, poll_active_object
 
 
 class QC3D_OT_add_inner_key(bpy.types.Operator):
@@ -17,14 +19,14 @@ class QC3D_OT_add_inner_key(bpy.types.Operator):
 
     bl_idname = "qc3d.add_inner_key"
     bl_label = "Add Key Between"
-    bl_options: ClassVar[set[str]] = {'UNDO', 'INTERNAL'}
+    bl_options = {'UNDO', 'INTERNAL'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        context.active_object.qc3d.via.add()
+    def execute(self, context: bpy.types.Context) -> Status:
+        settings_of(present(context.active_object)).via.add()
         return {'FINISHED'}
 
 
@@ -33,16 +35,19 @@ class QC3D_OT_remove_inner_key(bpy.types.Operator):
 
     bl_idname = "qc3d.remove_inner_key"
     bl_label = "Remove Key Between"
-    bl_options: ClassVar[set[str]] = {'UNDO', 'INTERNAL'}
+    bl_options = {'UNDO', 'INTERNAL'}
 
-    index: IntProperty(name="Row", description="Row of the key, from 0", min=0, options={'SKIP_SAVE'})
+    if TYPE_CHECKING:
+        index: int
+    else:
+        index: IntProperty(name="Row", description="Row of the key, from 0", min=0, options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        rows = context.active_object.qc3d.via
+    def execute(self, context: bpy.types.Context) -> Status:
+        rows = settings_of(present(context.active_object)).via
         if self.index >= len(rows):
             self.report({'ERROR'}, f"There is no row {self.index}; there are {len(rows)}.")
             return {'CANCELLED'}

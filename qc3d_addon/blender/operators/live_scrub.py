@@ -10,8 +10,9 @@ import bpy
 
 from .. import live_scrub
 from ..bake.plan import Plan, plan_preview
+from ..store import checks
 from .child_work import ChildWork
-from .common import SLIDER, chosen_chain, poll_chains
+from .common import SLIDER, Status, chosen_chain, poll_chains
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -22,7 +23,7 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
 
     bl_idname = "qc3d.live_scrub"
     bl_label = "Live Scrub"
-    bl_options = set()  # noqa: RUF012 - Blender reads it from the class; there is nothing to undo
+    bl_options = set()  # there is nothing to undo
 
     slider: SLIDER
 
@@ -30,14 +31,14 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         return self._switched_off(context) or super().invoke(context, event)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Status:
         return self._switched_off(context) or super().execute(context)
 
     def plan(self, context: bpy.types.Context) -> Plan:
-        obj = context.active_object
+        obj = checks.require_object(context.active_object)
         chain = chosen_chain(obj, self.slider)
         self.slider = chain.slider
         return plan_preview(obj, chain)
@@ -46,11 +47,12 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
         from ...solver.frames.preview import PreviewCurve
 
         chain = chosen_chain(plan.find_object(), self.slider)
+        assert outcome.bake is not None
         pairs = len(plan.request.keys) - 1
         live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.frame_options.easing))
         return [f"Drag the slider '{chain.slider}': it shows every moment now."]
 
-    def _switched_off(self, context: bpy.types.Context) -> set[str] | None:
+    def _switched_off(self, context: bpy.types.Context) -> Status | None:
         """Switch the preview off where it is on for this slider; None where it is not."""
         is_same = live_scrub.is_on(context.active_object, self.slider)
         live_scrub.end()

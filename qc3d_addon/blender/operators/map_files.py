@@ -5,20 +5,25 @@
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
 from ..bake import map_files
-from ..properties import fill_panel
+from ..kinds import present
+from ..properties import fill_panel, settings_of
+from ..store import checks
 from ..store.records import Chain, Record
 from .chains import ChainWork
-from .common import SLIDER, poll_active_object, poll_chains
+from .common import SLIDER, Status, poll_active_object, poll_chains
 
 _ENDING = ".qc3dmap"
-_FILTER = StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})
+if TYPE_CHECKING:
+    _FILTER = str
+else:
+    _FILTER = StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})
 
 
 class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
@@ -26,20 +31,26 @@ class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
 
     bl_idname = "qc3d.save_map"
     bl_label = "Save Map"
-    bl_options: ClassVar[set[str]] = {'REGISTER'}  # nothing in the file changes
+    bl_options = {'REGISTER'}  # nothing in the file changes
 
-    slider: SLIDER
-    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
-    check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
-    filter_glob: _FILTER
+    if TYPE_CHECKING:
+        slider: SLIDER
+        filepath: str
+        check_existing: bool
+        filter_glob: _FILTER
+    else:
+        slider: SLIDER
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        filter_glob: _FILTER
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_chains(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{bpy.path.clean_name(context.active_object.name)}{_ENDING}"
-        context.window_manager.fileselect_add(self)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        self.filepath = f"{bpy.path.clean_name(present(context.active_object).name)}{_ENDING}"
+        present(context.window_manager).fileselect_add(self)
         return {'RUNNING_MODAL'}
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
@@ -53,28 +64,32 @@ class QC3D_OT_load_map(bpy.types.Operator):
 
     bl_idname = "qc3d.load_map"
     bl_label = "Load Map"
-    bl_options: ClassVar[set[str]] = {'REGISTER', 'UNDO'}
+    bl_options = {'REGISTER', 'UNDO'}
 
-    filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
-    filter_glob: _FILTER
+    if TYPE_CHECKING:
+        filepath: str
+        filter_glob: _FILTER
+    else:
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        filter_glob: _FILTER
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        present(context.window_manager).fileselect_add(self)
         return {'RUNNING_MODAL'}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.active_object
+    def execute(self, context: bpy.types.Context) -> Status:
         try:
+            obj = checks.require_object(context.active_object)
             loaded = map_files.load_maps(obj, _path(self.filepath, "read"))
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
         # A map serves bakes with the choices it was made with; the panel shows them from now on.
-        fill_panel(obj.qc3d, loaded.through, loaded.options)
+        fill_panel(settings_of(obj), loaded.through, loaded.options)
         names = " to ".join(f"'{name}'" for name in loaded.through)
         self.report({'INFO'}, f"The map from {names} is ready; the panel has its choices.")
         return {'FINISHED'}

@@ -10,7 +10,8 @@ import bpy
 
 from ..bake.plan import Plan, plan_maps, write_maps
 from ..bake.request import BakeRequest
-from ..properties import MapChoices, fill_from_panel, fit_options, key_names
+from ..properties import MapChoices, fill_from_panel, fit_options, key_names, settings_of
+from ..store import checks
 from .child_work import ChildWork
 from .common import poll_active_object, poll_panel_keys
 
@@ -29,8 +30,8 @@ class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):
         return poll_active_object(cls, context) and poll_panel_keys(cls, context)
 
     def plan(self, context: bpy.types.Context) -> Plan:
-        obj = context.active_object
-        fill_from_panel(self.properties, obj.qc3d)
+        obj = checks.require_object(context.active_object)
+        fill_from_panel(self.properties, settings_of(obj))
         return plan_maps(obj, BakeRequest(key_names(self), 1, fit_options(self)))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import bpy
 
 from ...solver.errors import InputError
+from ..kinds import keys_of, mesh_of, shape_keys_of
 from . import records
 from .records import Chain
 
@@ -20,7 +21,7 @@ def object_problem(obj: bpy.types.Object | None) -> str | None:
         return "There is no active object; select a mesh with shape keys."
     if obj.type != 'MESH':
         return f"'{obj.name}' is not a mesh; select a mesh with shape keys."
-    mesh, keys = obj.data, obj.data.shape_keys
+    mesh, keys = mesh_of(obj), shape_keys_of(obj)
     for block in (obj, mesh, keys):
         if block is None:
             continue
@@ -78,7 +79,7 @@ def chain_problem(keys: bpy.types.Key, chain: Chain) -> str | None:
 
 def chains_problem(obj: bpy.types.Object) -> str | None:
     """Why ``obj`` has no in-betweens to work on, or None. Quick enough for a button that is drawn all the time."""
-    state = records.state(obj.data.shape_keys)
+    state = records.state(keys_of(obj))
     if state.problem is None and not state.chains:
         return f"'{obj.name}' has no in-betweens yet; bake some first."
     return state.problem

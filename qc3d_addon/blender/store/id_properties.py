@@ -9,6 +9,11 @@ from contextlib import ExitStack
 import bpy
 
 
+def has(block: bpy.types.bpy_struct, name: str) -> bool:
+    """Whether there is a custom property of that name. Quick enough for a panel."""
+    return name in block  # type: ignore[operator]  # Blender looks a name up; the stubs do not know
+
+
 def put(block: bpy.types.ID, name: str, value: str | bytes, undo: ExitStack) -> None:
     """Set a custom property; closing ``undo`` gives it the value again that it had, or removes it."""
     remove(block, name, undo)
@@ -19,7 +24,7 @@ def put(block: bpy.types.ID, name: str, value: str | bytes, undo: ExitStack) -> 
 def remove(block: bpy.types.ID, name: str, undo: ExitStack) -> None:
     """Remove a custom property, if it is there; closing ``undo`` puts it back."""
     # Blender cuts bytes at their first zero where they overwrite bytes; a new property keeps them whole.
-    if name in block:
+    if has(block, name):
         undo.callback(block.__setitem__, name, _plain(block[name]))
         del block[name]
 

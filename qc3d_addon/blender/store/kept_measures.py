@@ -60,7 +60,7 @@ def forget(keys: bpy.types.Key, slider: str, undo: ExitStack) -> None:
 
 def has(keys: bpy.types.Key, slider: str) -> bool:
     """Whether something is kept for a slider. Quick enough for a panel."""
-    return _property(slider) in keys
+    return id_properties.has(keys, _property(slider))
 
 
 def _property(slider: str) -> str:

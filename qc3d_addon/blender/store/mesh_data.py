@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ..kinds import keys_of, mesh_of
 from . import checks
 from .mirror_modifiers import mirror_planes
 
@@ -32,9 +33,9 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str], base: str = "") -> d
     """
     from ...solver.keys.keypair import consecutive_pairs
 
-    checks.require_keys(obj.data.shape_keys, names)
+    checks.require_keys(keys_of(obj), names)
     coordinates = {name: key_coordinates(obj, name) if name == base else shown_coordinates(obj, name) for name in names}
-    mesh = obj.data
+    mesh = mesh_of(obj)
     planes = mirror_planes(obj)
     return consecutive_pairs(coordinates, triangles(mesh), wire_edges(mesh), names, polygons(mesh), planes)
 
@@ -47,8 +48,8 @@ def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     InputError
         If the key holds another number of points than the mesh has vertices.
     """
-    mesh = obj.data
-    points = mesh.shape_keys.key_blocks[name].points
+    mesh = mesh_of(obj)
+    points = keys_of(obj).key_blocks[name].points
     if len(points) != len(mesh.vertices):
         raise InputError(
             f"Shape key '{name}' has {len(points)} points but the mesh has {len(mesh.vertices)} vertices; "
@@ -67,19 +68,19 @@ def shown_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
     InputError
         If the key holds another number of points than the mesh has vertices.
     """
-    keys = obj.data.shape_keys
+    keys = keys_of(obj)
     group = keys.key_blocks[name].vertex_group
     coordinates = key_coordinates(obj, name)
     if not group or group not in obj.vertex_groups:
         return coordinates
     # Blender itself mixes it, on a copy that is in no scene.
     copy = obj.copy()
-    mesh = copy.data = obj.data.copy()
+    mesh = copy.data = mesh_of(obj).copy()
     try:
         copy.show_only_shape_key = False
-        for key in mesh.shape_keys.key_blocks:
+        for key in keys_of(copy).key_blocks:
             key.mute = key.name != name
-        mixed_key = mesh.shape_keys.key_blocks[name]
+        mixed_key = keys_of(copy).key_blocks[name]
         mixed_key.slider_min, mixed_key.slider_max, mixed_key.value = 0.0, 1.0, 1.0
         mixed = key_coordinates(copy, copy.shape_key_add(name="mixed", from_mix=True).name)
     finally:
@@ -119,4 +120,5 @@ def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     mesh.loops.foreach_get("edge_index", edge_of_corner)
     is_wire = np.ones(len(mesh.edges), dtype=bool)
     is_wire[edge_of_corner] = False
-    return ends.reshape(-1, 2)[is_wire]
+    wires: NDArray[np.int32] = ends.reshape(-1, 2)[is_wire]
+    return wires

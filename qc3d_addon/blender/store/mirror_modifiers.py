@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -30,8 +30,9 @@ def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
     """
     planes = []
     for modifier in obj.modifiers:
-        if modifier.type == "MIRROR" and modifier.show_viewport:
-            chosen = zip(modifier.use_axis, modifier.use_bisect_axis, strict=True)
+        if isinstance(modifier, bpy.types.MirrorModifier) and modifier.show_viewport:
+            axes: tuple[Any, Any] = (modifier.use_axis, modifier.use_bisect_axis)  # no arrays to read in 5.2's stubs
+            chosen = zip(*axes, strict=True)
             for axis, (is_mirrored, is_bisected) in enumerate(chosen):
                 if is_mirrored and not is_bisected:
                     planes.append(_plane(obj, modifier, axis))
@@ -42,7 +43,7 @@ def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int)
     from ...solver.keys.halves import MirrorPlane
 
     # A vertex is merged with its image, which is twice as far from it as the plane is.
-    reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * max(obj.dimensions)
+    reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * max(obj.dimensions[:])
     if modifier.mirror_object is None:
         return MirrorPlane.across(axis, reach)
     own, other = (np.array(shown.matrix_world, dtype=np.float64) for shown in (obj, modifier.mirror_object))

@@ -17,16 +17,17 @@ _AFTER_LABEL = len("_99_9") + len(".001")
 _LEAST_ROOM = 9  # bytes of a name that still tell keys apart; with less for each, only the first and the last are named
 
 
-def chain_label(keys: Sequence[str], taken: Container[str]) -> str:
+def chain_label(keys: Sequence[str], taken: Container[str], mark: str = "") -> str:
     """The name of the slider that goes through two keys or more, and the start of the names of its shape keys.
 
     It reads "first_to_second_to_third". Long names lose their middle, because variants of one name usually differ at an
     end; where there are too many keys the inner ones become "__"; a label that is taken gets a number.
+    ``mark`` comes behind it.
     """
     number = 1
     while True:
-        mark = "" if number == 1 else f"_v{number}"
-        label = _join(keys, LIMIT - _AFTER_LABEL - len(mark)) + mark
+        marks = mark if number == 1 else f"{mark}_v{number}"
+        label = _join(keys, LIMIT - _AFTER_LABEL - len(marks)) + marks
         if label not in taken:
             return label
         number += 1
@@ -41,6 +42,14 @@ def key_name(label: str, step: int, places: Sequence[float]) -> str:
         return f"{label}_{round(100.0 * places[step]):02d}"
     whole, tenths = divmod(round(1000.0 * places[step]), 10)
     return f"{label}_{whole:02d}_{tenths}"
+
+
+def combination_name(keys: Sequence[str], places: Sequence[float]) -> str:
+    """The name of the shape key that corrects keys that are on at once, by their values: "Jaw_Smile_50_100"."""
+    ending = "".join(f"_{round(100.0 * place)}" for place in places)
+    room = LIMIT - len(".001") - _size(ending) - (len(keys) - 1)
+    parts = [_shorten(key, room // len(keys)) for key in keys]
+    return "_".join(parts) + ending
 
 
 def _join(keys: Sequence[str], room: int) -> str:

@@ -124,6 +124,13 @@ class Chain:
         return self.through[0] if self.on_key else ""
 
     @property
+    def mode(self) -> str:
+        """The mode of the newest bake; empty where that is not known."""
+        settings = self.request.get("settings")
+        mode = settings.get("mode") if isinstance(settings, dict) else None
+        return mode if isinstance(mode, str) else ""
+
+    @property
     def intervals(self) -> int:
         """Number of steps from the first key to the last."""
         return len(self.places) - 1
@@ -191,7 +198,7 @@ class Record:
                 )
             chains = [Chain.from_json(entry) for entry in stored.plain_list(values["chains"])]
             maps = [KeptMap.from_json(entry) for entry in stored.plain_list(values["maps"])]
-            controls = [chain.on_key or chain.through for chain in chains]
+            controls = [chain.on_key or (chain.through, chain.mode) for chain in chains]
             for of_each in ([chain.slider for chain in chains], controls):
                 if len(set(of_each)) < len(of_each):
                     raise ValueError("two chains with one slider, or through the same keys")
@@ -219,9 +226,10 @@ class Record:
         self._parsed(text, keys.name)  # what could not be read again is never written
         id_properties.put(keys, PROPERTY, text, undo)
 
-    def chain(self, through: tuple[str, ...]) -> Chain | None:
-        """The chain through these keys on a slider of its own, if it was baked before."""
-        return next((chain for chain in self.chains if chain.through == through and not chain.on_key), None)
+    def chain(self, through: tuple[str, ...], mode: str = "") -> Chain | None:
+        """The chain through these keys on a slider of its own, in this mode or any, if it was baked before."""
+        found = [chain for chain in self.chains if chain.through == through and not chain.on_key]
+        return next((chain for chain in found if not mode or chain.mode in ("", mode)), None)
 
     def chain_on_key(self, name: str) -> Chain | None:
         """The chain that the value of a key plays, if it was baked before."""

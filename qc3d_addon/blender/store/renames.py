@@ -61,9 +61,10 @@ def _read(keys: bpy.types.Key, made: Iterable[str]) -> str | None:
         return None
     for name in made:
         curve = keys.animation_data.drivers.find(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
-        if curve is None or len(curve.driver.variables) != 1 or curve.driver.variables[0].type != 'SINGLE_PROP':
+        variables = [] if curve is None or curve.driver is None else list(curve.driver.variables)
+        if len(variables) != 1 or variables[0].type != 'SINGLE_PROP':
             continue
-        match = _VALUE.fullmatch(curve.driver.variables[0].targets[0].data_path)
+        match = _VALUE.fullmatch(variables[0].targets[0].data_path)
         read = None if match is None else bpy.utils.unescape_identifier(match[1])
         if read is not None and read in keys.key_blocks:
             return str(read)

@@ -4,17 +4,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 
 from ...solver.errors import InputError
 from .. import live_scrub
+from ..chains import to_key
 from ..heat_map import heat_map
 from ..keys import chain_keys
+from ..keys.double_motion import double_motion
+from ..kinds import keys_of, present, shape_keys_of
 from ..operators.bake_inbetweens import QC3D_OT_rebake
 from ..operators.chains import (
     QC3D_OT_absolute_keys,
     QC3D_OT_export_alembic,
     QC3D_OT_mirror,
+    QC3D_OT_play_on_key,
     QC3D_OT_remove,
     QC3D_OT_to_keyframes,
 )
@@ -22,13 +28,17 @@ from ..operators.forget_record import QC3D_OT_forget_record
 from ..operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from ..operators.live_scrub import QC3D_OT_live_scrub
 from ..operators.map_files import QC3D_OT_save_map
+from ..properties import settings_of
 from ..store import checks, kept_measures, records
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 
-_MORE = (
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import IconItems
+
+_MORE: tuple[tuple[type[bpy.types.Operator], IconItems], ...] = (
     (QC3D_OT_mirror, 'MOD_MIRROR'),
     (QC3D_OT_to_keyframes, 'KEYFRAME'),
     (QC3D_OT_absolute_keys, 'DUPLICATE'),
@@ -52,22 +62,24 @@ class QC3D_PT_results(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.active_object
-        if obj is None or obj.type != 'MESH' or obj.data.shape_keys is None:
+        if obj is None or obj.type != 'MESH' or shape_keys_of(obj) is None:
             return False
-        state = records.state(obj.data.shape_keys)
+        state = records.state(keys_of(obj))
         return state.chains > 0 or state.problem is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        obj = context.active_object
+        obj, layout = present(context.active_object), present(self.layout)
         try:
-            chains = Record.read(obj.data.shape_keys).chains
+            chains = Record.read(keys_of(obj)).chains
         except InputError as error:
-            draw_sentence(context, self.layout, str(error), 'ERROR')
-            if records.state(obj.data.shape_keys).is_damaged:
-                self.layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
+            draw_sentence(context, layout, str(error), 'ERROR')
+            if records.state(keys_of(obj)).is_damaged:
+                layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
             return
         for chain in reversed(chains):
-            _draw_chain(context, self.layout.box(), obj, chain)
+            box = layout.box()
+            _draw_chain(context, box, obj, chain)
+            _draw_double_motion(context, box, obj, chain, chains)
 
 
 def _draw_chain(
@@ -79,9 +91,9 @@ def _draw_chain(
         layout.prop(*control.shown, text=control.name, slider=True)
     else:
         draw_sentence(context, layout, control_problem, 'ERROR')
-    if chain_keys.are_drivers_stopped(obj.data.shape_keys, chain):
+    if chain_keys.are_drivers_stopped(keys_of(obj), chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
-    problem = checks.chain_problem(obj.data.shape_keys, chain)
+    problem = checks.chain_problem(keys_of(obj), chain)
     buttons = layout.row(align=True)
     if problem is not None and chain.mirror_of:  # it has no keys of its own to be made from
         buttons.operator(QC3D_OT_mirror.bl_idname, text="Mirror Again", icon='MOD_MIRROR').slider = chain.mirror_of
@@ -102,6 +114,17 @@ def _draw_chain(
         column = more.column(align=True)
         for operator, icon in _MORE[1:] if chain.mirror_of else _MORE:
             column.operator(operator.bl_idname, icon=icon).slider = chain.slider
+
+
+def _draw_double_motion(
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, chains: list[Chain]
+) -> None:
+    """What adds to what the control shows, as it is now, and the button that ends it where there is one."""
+    found = double_motion(obj, chain, chains)
+    for sentence in found:
+        draw_sentence(context, layout, sentence, 'ERROR')
+    if found and to_key.problem(obj, chain) is None:
+        layout.operator(QC3D_OT_play_on_key.bl_idname, icon='SHAPEKEY_DATA').slider = chain.slider
 
 
 def _draw_result(
@@ -143,10 +166,10 @@ def _draw_distortion(layout: bpy.types.UILayout, obj: bpy.types.Object, chain: C
         row = layout.row(align=True)
         row.label(text=f"Worst stretch +{worst.excess:.1%} at {worst.at:.2f}")
         row.operator(QC3D_OT_select_worst.bl_idname, text="", icon='RESTRICT_SELECT_OFF').slider = chain.slider
-    if kept_measures.has(obj.data.shape_keys, chain.slider):
+    if kept_measures.has(keys_of(obj), chain.slider):
         state = heat_map.shown(obj)
         row = layout.row(align=True)
-        row.prop(obj.qc3d, "measure", text="")
-        is_shown = state is not None and (state.slider, state.measure) == (chain.slider, obj.qc3d.measure)
+        row.prop(settings_of(obj), "measure", text="")
+        is_shown = state is not None and (state.slider, state.measure) == (chain.slider, settings_of(obj).measure)
         button = row.operator(QC3D_OT_heat_map.bl_idname, icon='SHADING_RENDERED', depress=is_shown)
-        button.slider, button.measure = chain.slider, obj.qc3d.measure
+        button.slider, button.measure = chain.slider, settings_of(obj).measure

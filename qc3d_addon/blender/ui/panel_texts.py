@@ -5,15 +5,24 @@
 from __future__ import annotations
 
 import textwrap
+from typing import TYPE_CHECKING
 
 import bpy
+
+from ..kinds import present
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import IconItems
 
 _MARGINS, _LETTER = 85.0, 6.2  # tabs, borders and icon; a letter on average
 
 
-def draw_sentence(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: str = 'INFO') -> None:
+def draw_sentence(
+    context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: IconItems = 'INFO'
+) -> None:
     """Draw a sentence over as many lines as the width of the sidebar asks for; Blender would cut it."""
-    points = context.region.width / context.preferences.system.ui_scale
+    region, preferences = present(context.region), present(context.preferences)
+    points = region.width / preferences.system.ui_scale
     width = max(16, int((points - _MARGINS) / _LETTER))
     lines = layout.column(align=True)
     for index, line in enumerate(textwrap.wrap(sentence, width)):

@@ -4,23 +4,26 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import bpy
 
 from ...worker import engines
 from ..bake import jobs, progress_bar
-from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens
+from ..kinds import keys_of, present
+from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
 from ..operators.cancel import QC3D_OT_cancel
 from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
 from ..operators.map_files import QC3D_OT_load_map
 from ..operators.prepare import QC3D_OT_prepare
-from ..properties import ObjectSettings, key_names
+from ..properties import ObjectSettings, key_names, settings_of
 from ..store import checks, records
 from . import presets
 from .panel_texts import draw_sentence
 
 # Else Blender asks the operators whether they can run as if the mouse were over the 3D view, not over this panel.
-IN_THE_SIDEBAR = 'INVOKE_DEFAULT'
+IN_THE_SIDEBAR: Literal['INVOKE_DEFAULT'] = 'INVOKE_DEFAULT'
 
 
 class QC3D_PT_inbetweens(bpy.types.Panel):
@@ -32,14 +35,14 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
     bl_category = "QC3D"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
+        layout = present(self.layout)
         layout.use_property_split = True
         layout.use_property_decorate = False
         obj = context.active_object
         problem = checks.object_problem(obj)
-        if problem is None:
+        if obj is not None and problem is None:
             _draw_choices(layout, obj)
-            problem = checks.keys_problem(obj.data.shape_keys, key_names(obj.qc3d))
+            problem = checks.keys_problem(keys_of(obj), key_names(settings_of(obj)))
         job = jobs.current()
         if job is not None:
             _draw_job(layout, job)
@@ -53,18 +56,23 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             every.operator_context = IN_THE_SIDEBAR
             every.operator(QC3D_OT_bake_keys.bl_idname, text="Selected Keys").which = "selected"
             every.operator(QC3D_OT_bake_keys.bl_idname, text="All Keys").which = "all"
+            if len(context.selected_objects) > 1:
+                together = layout.column()
+                together.operator_context = IN_THE_SIDEBAR
+                together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')
         if problem is not None:
             draw_sentence(context, layout, problem)
             return
-        notice = engines.engine_notice() if obj.qc3d.engine != 'delaunay' else None
-        if notice is not None and not records.state(obj.data.shape_keys).chains:  # else it is said with what was baked
+        obj = present(obj)
+        notice = engines.engine_notice() if settings_of(obj).engine != 'delaunay' else None
+        if notice is not None and not records.state(keys_of(obj)).chains:  # else it is said with what was baked
             draw_sentence(context, layout, notice)
 
 
 def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    settings = obj.qc3d
+    settings = settings_of(obj)
     presets.draw(layout)
-    _draw_keys(layout, settings, obj.data.shape_keys)
+    _draw_keys(layout, settings, keys_of(obj))
     amount = layout.column(align=True)
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
     amount.prop(settings, "use_tolerance")

@@ -33,10 +33,12 @@ class QC3D_MT_presets(bpy.types.Menu):
     bl_label = "Presets"
     preset_subdir = FOLDER
     preset_operator = "script.execute_preset"
-    draw = bpy.types.Menu.draw_preset
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.draw_preset(context)
 
 
-class QC3D_OT_add_preset(AddPresetBase, bpy.types.Operator):
+class QC3D_OT_add_preset(AddPresetBase, bpy.types.Operator):  # type: ignore[misc]  # the first has no types
     """Save the panel's choices under a name, or remove the preset of that name"""
 
     bl_idname = "qc3d.add_preset"

@@ -64,17 +64,25 @@ class CrossingLimit:
         All false if the shape does not cross itself more than the worse key, or if its crossings are unknown.
         """
         found = np.zeros(len(shape), dtype=bool)
+        found[self._faces[self.new_pairs(shape)].ravel()] = True
+        return found
+
+    def new_pairs(self, shape: Floats) -> Ints:
+        """(k, 2) the triangles that cross each other in ``shape`` (n, 3) but in neither key.
+
+        None if the shape does not cross itself more than the worse key, or if its crossings are unknown.
+        """
+        none = np.empty((0, 2), dtype=np.int64)
         if self._known is None:
-            return found
+            return none
         try:
             codes = self._codes(shape)
         except CrowdedError:
-            return found
-        if len(codes) > self._allowed:
-            fresh = codes[~np.isin(codes, self._known)]
-            triangles = np.concatenate([fresh // len(self._faces), fresh % len(self._faces)])
-            found[self._faces[triangles].ravel()] = True
-        return found
+            return none
+        if len(codes) <= self._allowed:
+            return none
+        fresh = codes[~np.isin(codes, self._known)]
+        return np.stack([fresh // len(self._faces), fresh % len(self._faces)], axis=1)
 
     def faded(self, chosen: Bools) -> Floats:
         """(n,) weights that are 1 at the chosen vertices and fall to 0 a few rings of neighbors away."""

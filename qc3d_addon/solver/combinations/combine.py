@@ -99,20 +99,22 @@ def combine(
     on = [alone[number] for number in through if number in alone]
     if len(on) < 2:
         return Combination((on[0] if on else keys.base).copy(), through, 0, tuple(notes))
-    shape, crossings = yield from told(_uncrossed(keys, on, chosen), partial(_sharing, len(partly), len(partly)))
+    shape, crossings = yield from told(together(keys, on, chosen), partial(_sharing, len(partly), len(partly)))
     yield Progress("frames", 1.0)
     if crossings:
         notes.append(f"{crossings} pairs of triangles cross that do so in none of the keys.")
     return Combination(shape, through, crossings, tuple(notes))
 
 
-def _uncrossed(keys: KeysOnBase, on: Sequence[Floats], options: FitOptions) -> Steps[tuple[Floats, int | None]]:
+def together(
+    keys: KeysOnBase, on: Sequence[Floats], options: FitOptions, composer: Composer | None = None
+) -> Steps[tuple[Floats, int | None]]:
     """The combined shape (n, 3) of the shapes ``on``, and its number of crossings beyond theirs.
 
     Where it crosses itself, it is drawn to what the outer shapes carry along. If that does not help, it is drawn to the
     image of the base under the closest fold-free map of the volume: this crosses itself only where the base does.
     """
-    composer = Composer(keys)
+    composer = composer or Composer(keys)
     best = composer.composed(on)
     base, *others = (keys.scaled(each) for each in (keys.base, *on))
     limit = JointCrossings(keys.faces, base, others, keys.still[keys.vertices])

@@ -82,9 +82,7 @@ class Composer:
             surface = surface.with_anchor_weights(self._anchor_weights(turned[0]) * system.stronger(places, strength))
         start = anchors.copy()
         start[~self._free] = (self._base + sum(shape - self._base for shape in scaled))[~self._free]
-        rotation = rotation_matrices(turned[0].turns)
-        for inner in turned[1:]:
-            rotation = products(rotation, rotation_matrices(inner.turns))
+        rotation = _composed_rotations(turned)
         rows = surface.rows
         wanted = Wanted(
             start,
@@ -107,6 +105,13 @@ class Composer:
         system = self._system(self._usable(scaled))
         turned = [TriangleDeformation.between(self._base, shape, system.faces) for shape in scaled]
         return self._keys.whole(system.carried(self._base, scaled, turned), shapes)
+
+    def turns(self, shapes: Sequence[Floats]) -> Floats:
+        """(n, 3, 3) how all of ``shapes`` (n, 3) together turn the region around each vertex."""
+        scaled = [self._keys.scaled(shape) for shape in shapes]
+        system = self._system(self._usable(scaled))
+        turned = [TriangleDeformation.between(self._base, shape, system.faces) for shape in scaled]
+        return np.asarray(system.averages.rotations(_composed_rotations(turned))[self._keys.group])
 
     def _usable(self, scaled: Sequence[Floats]) -> Ints:
         """(u, 3) the usable triangles: those that have an area in all shapes."""
@@ -152,6 +157,14 @@ class _System:
     def stronger(self, places: Bools, strength: float) -> Floats:
         """(k,) factors on the anchor weights: ``strength`` at the places, fading to 1 around them."""
         return np.asarray(strength ** self.averages.faded(places))
+
+
+def _composed_rotations(turned: Sequence[TriangleDeformation]) -> Floats:
+    """(m, 3, 3) the rotations of all, the first the outermost."""
+    rotation = rotation_matrices(turned[0].turns)
+    for inner in turned[1:]:
+        rotation = products(rotation, rotation_matrices(inner.turns))
+    return rotation
 
 
 def _stretches(turned: Sequence[TriangleDeformation]) -> Floats:

@@ -20,6 +20,7 @@ from ..support.threads import beside
 from ..surface.path import SurfacePath
 from ..tets.point_location import interpolation_matrix
 from .continuation import follow_path, path_to
+from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
 
@@ -81,26 +82,32 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
         seconds,
         path,
     )
+    notes = [*filled.notes]
+    turned = half_turned_parts(path)
     missed = fitted.landmark_residual().rms
     if out_of_reach.parts:
-        note = (
-            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys, which no motion of a "
-            "volume can do. Mode straight may look as good."
+        notes.append(
+            f"{_parts(out_of_reach.parts)} mirrored or turned inside out between the keys{out_of_reach.where}, which "
+            "no motion of a volume can do. Mode straight may look as good."
         )
     elif missed > _LARGE_RESIDUAL:
-        note = (
+        other = " Where a part goes the wrong way round, choose other extra turns." if turned else ""
+        notes.append(
             f"The map misses the second key by {missed:.0%} of its size: no map without folds can come closer where "
-            "the second key crosses itself or is flattened. Mode straight may look as good."
+            f"the second key crosses itself or is flattened. Mode straight may look as good.{other}"
         )
-    else:
-        return fitted
-    return replace(fitted, notes=(*filled.notes, note))
+    if turned and not options.extra_turns:
+        notes.append(
+            f"{'A part turns' if turned == 1 else f'{turned} parts turn'} by half a turn, for which both ways are as "
+            "long; -1 as extra turns takes the other way."
+        )
+    return replace(fitted, notes=tuple(notes))
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
     """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
-        path = SurfacePath(embedding, options.stretch, options.extra_turns != 0)
+        path = path_between(embedding, options)
         return path, path_to(path, in_single_precision(embedding.key1))
 
 

@@ -19,6 +19,7 @@ from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
 from ..triangles.winding_number import insideness, winding_numbers
+from .directions import path_between
 from .fold_free import FoldFreeFitter
 from .fold_repair import covered
 
@@ -107,7 +108,7 @@ class FittedMap:
     @cached_property
     def surface_path(self) -> SurfacePath:
         """The surface path between the keys; cached, because setting it up takes as long as several frames."""
-        return self.path or SurfacePath(self.embedding, self.options.stretch, self.options.extra_turns != 0)
+        return self.path or path_between(self.embedding, self.options)
 
     @cached_property
     def insideness(self) -> Floats:

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens: the modes, chains of keys, what a bake is and what it reports."""
+"""In-betweens: the modes, chains of keys, bakes and their reports."""

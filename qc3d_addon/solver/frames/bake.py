@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake is: frames at times, with a report; and which times and pairs of keys make sense."""
+"""Bakes: frames at times, with a report; and the validation of times and chains."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Bake:
         return replace(self, frames=self.frames[:, :count], report=self.report.of_first(count), measures=measures)
 
     def at(self, chosen: Ints) -> Bake:
-        """The bake of some of its frames, by their numbers (c,)."""
+        """The bake of only some of its frames, given by their indices (c,)."""
         measures = {name: values[chosen] for name, values in self.measures.items()}
         maps = tuple(self.maps[index] for index in chosen) if self.maps else ()
         return Bake(self.times[chosen], self.frames[chosen], self.report.at(chosen.tolist()), measures, maps)
@@ -71,7 +71,7 @@ def evenly_spaced(count: int) -> Floats:
 
 
 def checked_times(times: ArrayLike) -> Floats:
-    """(k,) times of frames; raises InputError where they are no numbers from 0 to 1."""
+    """(k,) times of frames as an array; raises InputError unless all are numbers from 0 to 1."""
     try:
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
     except (TypeError, ValueError) as reason:
@@ -82,16 +82,16 @@ def checked_times(times: ArrayLike) -> Floats:
 
 
 def require_chain(pairs: Sequence[KeyPair]) -> None:
-    """Raise InputError unless every pair begins with the key that ended the one before."""
+    """Raise InputError unless every pair starts with the key at which the previous one ends."""
     for left, right in pairwise(pairs):
         if not np.array_equal(left.key1, right.key0):
             raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
 
 
 def split(times: Floats, count: int) -> tuple[Ints, Floats]:
-    """Number of the pair and time within it, 0..1, for times along a chain of ``count`` pairs."""
+    """Index of the pair, and time within it, 0..1, for times along a chain of ``count`` pairs."""
     along = times * count
-    # Times like 1/3 are not exact: what is meant to be a key is one.
+    # Times such as 1/3 are not exact in floating point; times that are meant to be keys must hit them.
     whole = np.round(along)
     along = np.where(np.abs(along - whole) < 1e-9, whole, along)
     segments = np.minimum(np.floor(along), count - 1)

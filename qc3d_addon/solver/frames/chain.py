@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From keys and their fits to the frames of a chain, with a report."""
+"""The frames of a chain of keys, with a report."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def chain_frames(
     options: FrameOptions,
     collider: PosedCollider | None = None,
 ) -> Steps[Bake]:
-    """Frames through two keys or more in a row; the keys themselves, bit for bit, where the time is theirs.
+    """Compute the frames of a chain of two or more keys; at the time of a key, the frame is the key, bit for bit.
 
     Parameters
     ----------
@@ -117,9 +117,9 @@ def chain_frames(
 
 
 def _put_keys(made: dict[int, Frame], members: Ints, times: Floats, pair: KeyPair) -> float:
-    """Put the keys themselves at 0 and 1; returns how far the frames computed there were from them.
+    """Replace the frames at the times 0 and 1 by the keys; return the largest coordinate difference.
 
-    The frame at a key is the key: it crosses itself as often as that does.
+    Such a frame has no crossings beyond those of the key.
     """
     error = 0.0
     for index in members.tolist():

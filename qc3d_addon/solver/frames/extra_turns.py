@@ -68,7 +68,10 @@ def _mean_turns(surface: SurfacePath, labels: Ints) -> Floats:
     """(components, 3) weighted means of the rotation vectors of each component's triangles; zero where it has none."""
     deformation = surface.deformation
     owner = labels[surface.vertices[deformation.faces[:, 0]]]
-    return means_by_label(owner, deformation.turns, deformation.weights, int(labels.max()) + 1)
+    # As the path has them turn, which may be the long way round; those of parts with a twist are told by the keys.
+    turning = surface.turning
+    turns = np.where(turning.twist.any(axis=1)[:, None], deformation.turns, turning.swing)
+    return means_by_label(owner, turns, deformation.weights, int(labels.max()) + 1)
 
 
 def _held(points: Floats, still: Bools, labels: Ints) -> Bools:

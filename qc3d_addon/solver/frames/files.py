@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames written to .npz files."""
+"""Writing frames to .npz files."""
 
 from __future__ import annotations
 

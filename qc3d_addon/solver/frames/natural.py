@@ -23,6 +23,7 @@ from ..surface.path import SurfacePath
 from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
+from .loose_pieces import LoosePieces
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -134,6 +135,10 @@ class NaturalFrames:
             excess.extend(crossing)
             yield len(volumes) / len(times)
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
+        if any(crossings):
+            embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
+            pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
+            positions, crossings = pieces.apart(self._limit, times, positions, crossings)
         moves = [self._alignment.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
         if resolver is not None:
             positions = yield from self._cleared(resolver, times, volumes, positions, moves)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes for a control: which moments of a motion become shapes, and what is played between them."""
+"""Shapes for a control: which moments of a motion become shapes, and how well the control plays the motion."""
 
 from __future__ import annotations
 
@@ -24,26 +24,24 @@ from .measures import worst_excess
 from .report import PlayedReport, crossing_notes
 from .weights import Weights, fewest_knots
 
-# Where it is looked at between two shapes: parts of the way from the one to the other.
-_LOOKED_AT = (0.25, 0.5, 0.75)
-# Enclosed volumes below this part of the largest have no deviation to speak of.
-_LEAST_VOLUME = 1e-6
-# Times that differ by less are one.
-_SAME = 1e-6
+_LOOKED_AT = (0.25, 0.5, 0.75)  # places between two neighboring shapes at which what is played is measured
+_LEAST_VOLUME = 1e-6  # of the largest volume; a relative deviation of smaller ones means little
+_SAME = 1e-6  # times that differ by less are equal
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Which moments of a motion to compute so that a control can play it.
+    """The moments of a motion that are computed so that a control can play it.
 
     Parameters
     ----------
     times : (k,)
         Positions of the control, 0..1, increasing.
     keys : (pairs + 1,) int64
-        Which of them are the keys.
+        Indices of the keys among them.
     shapes : (s,) int64
-        Which of them become shapes where the number of in-betweens is given; the others are to compare with.
+        Indices of the moments that become shapes, if the number of in-betweens is given; the other moments are for
+        comparison.
     """
 
     times: Floats
@@ -52,7 +50,7 @@ class Moments:
 
     @classmethod
     def of(cls, options: PlayOptions, frames: FrameOptions, pairs: int) -> Moments:
-        """The moments that a control through so many pairs of keys needs."""
+        """The moments for a control that goes through ``pairs`` pairs of keys."""
         at_keys = uneased(np.linspace(0.0, 1.0, pairs + 1), frames.easing)
         steps = DENSE_STEPS if options.tolerance > 0.0 else options.count + 1
         between = np.arange(1, steps) / steps
@@ -64,8 +62,8 @@ class Moments:
         return cls(times, np.searchsorted(times, at_keys), np.searchsorted(times, shapes))
 
     def chosen(self, options: PlayOptions, frames: FrameOptions, motion: Floats) -> tuple[Ints, list[int]]:
-        """The moments (c,) that become shapes, and at which of them the path turns, for the whole motion (k, n, 3)."""
-        # Only natural motions go through keys without a corner.
+        """Choose shapes for a motion (k, n, 3): indices (c,) of their moments, and those of shapes with a corner."""
+        # Only natural motions have no corners at keys.
         corners = self.keys[1:-1].tolist() if frames.mode != "natural" else []
         everywhere = options.weights == "hats"
         shapes = self.shapes
@@ -86,14 +84,19 @@ def played(
     options: PlayOptions,
     frames: FrameOptions,
 ) -> Bake:
-    """The bake of the moments that become shapes, with what is played between them in its report.
+    """The bake of only those moments that become shapes; its report measures what is played between them.
 
     Parameters
     ----------
     bake : Bake
-        At all the moments.
-    pairs, fits
-        Consecutive pairs of keys, and their fits; none in mode ``straight``.
+        The bake of all moments.
+    moments : Moments
+    pairs : sequence of KeyPair
+        Consecutive pairs of keys.
+    fits : sequence of FittedMap
+        The fit of each pair; empty in mode ``straight``.
+    options : PlayOptions
+    frames : FrameOptions
     """
     chosen, corners = moments.chosen(options, frames, bake.frames)
     shapes = bake.at(chosen)
@@ -138,19 +141,19 @@ def played(
 
 
 def _distinct(times: Floats) -> Floats:
-    """Sorted times (k,), those that differ by rounding taken as one."""
+    """(k,) distinct times, sorted; times that differ by rounding only are equal."""
     ordered = np.sort(times)
     return ordered[np.diff(ordered, prepend=-1.0) > _SAME]
 
 
 def _between(knots: Floats, frames: FrameOptions, pairs: int) -> tuple[Floats, Ints, Floats]:
-    """Positions (p,) between the knots, the numbers of their pairs of keys, and times within these."""
+    """Positions (p,) between the knots, the indices of their pairs of keys, and their times within these pairs."""
     positions = (knots[:-1, None] + np.array(_LOOKED_AT) * np.diff(knots)[:, None]).ravel()
     return positions, *split(eased(positions, frames.easing), pairs)
 
 
 def _volume_deviations(pair: KeyPair, shapes: Floats, times: Floats) -> list[float]:
-    """How far enclosed volumes of shapes (p, n, 3) are from the line between those of the keys, the worst part's."""
+    """For each shape (p, n, 3), the largest relative deviation of a component's volume from the interpolated one."""
     vertices, group = pair.welding
     faces = group[pair.faces]
     closed = ClosedComponents(faces, vertex_components(unique_edges(sides(faces)), len(vertices)))
@@ -166,11 +169,11 @@ def _volume_deviations(pair: KeyPair, shapes: Floats, times: Floats) -> list[flo
 
 
 def _new_crossings(pair: KeyPair, shapes: Floats) -> list[int | None]:
-    """Crossing pairs of triangles of each shape (p, n, 3) beyond those of the worse key."""
+    """For each shape (p, n, 3), the number of crossing pairs of triangles beyond that of the worse key."""
     crossings = PairCrossings(pair)
     return list(in_threads(crossings.excess, shapes))
 
 
 def _with_keys(fitted: FittedMap, maps: Sequence[Floats]) -> Floats:
-    """(k, N, 3) maps of the frames of one pair of keys, with the pair's own at its two keys."""
+    """(k, N, 3) maps of the frames of one pair, with the identity and the fitted map at the two keys."""
     return np.stack([fitted.mesh.points, *maps[1:-1], fitted.mapped])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes at any time from frames that are dense enough, in a fraction of a millisecond."""
+"""Previews: shapes at any time, interpolated between dense frames in a fraction of a millisecond."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ Singles = NDArray[np.float32]
 
 
 class PreviewCurve:
-    """A cubic spline in time through the frames of every pair, twice differentiable but at the keys.
+    """A cubic spline in time through the frames of each pair, twice differentiable except at the keys.
 
-    It keeps two single-precision numbers for each coordinate of each frame.
+    It stores two single-precision numbers for each coordinate of each frame.
 
     Parameters
     ----------
     frames : (pairs · d + 1, n, 3)
-        Evenly spaced frames, without easing, from the first key of all to the last, d >= 3 steps for every two keys.
-    pairs
+        Evenly spaced frames without easing, from the first key to the last, with d >= 3 steps between every two keys.
+    pairs : int
         Number of pairs of keys that the frames go through.
-    easing
-        How far along the frames the curve is at a time. Easing is left to the curve since the keys, where frames of
-        several pairs turn, must be among the frames.
+    easing : Easing
+        Applied by the curve, because the frames must include the keys, where the motion may have corners.
     """
 
     def __init__(self, frames: Floats, pairs: int = 1, easing: Easing = "linear") -> None:
@@ -38,7 +37,7 @@ class PreviewCurve:
         self._frames = frames.astype(np.float32)
         flat = frames.reshape(len(frames), -1)
         parts = [flat[first : first + self._steps + 1] for first in range(0, len(frames) - 1, self._steps)]
-        # A key between two pairs has a slope from either side: (pairs, d + 1, n, 3).
+        # An inner key has a slope on each side: (pairs, d + 1, n, 3).
         slopes = np.stack([operator @ part for part in parts]).astype(np.float32)
         self._slopes = slopes.reshape(pairs, self._steps + 1, *frames.shape[1:])
 
@@ -53,7 +52,7 @@ class PreviewCurve:
         return self._frames.nbytes + self._slopes.nbytes
 
     def at(self, time: float) -> Singles:
-        """(n, 3) positions at ``time``, held to 0..1; the frames themselves, bit for bit, at their times."""
+        """(n, 3) positions at ``time``, clamped to 0..1; the frames themselves, bit for bit, at their times."""
         passed = eased(np.clip([time], 0.0, 1.0), self._easing).item()
         along = passed * (len(self._frames) - 1)
         before = min(int(along), len(self._frames) - 2)
@@ -71,7 +70,7 @@ class PreviewCurve:
         return np.asarray(result)
 
     def beyond(self, time: float, weights: Weights) -> Singles:
-        """(n, 3) what the curve adds at ``time`` to what a control with these weights plays of its own positions."""
+        """(n, 3) difference at ``time`` of the curve from what a control with these weights plays of the curve."""
         time = min(max(time, 0.0), 1.0)
         added = self.at(time)
         for weight, knot in zip(weights.at(time)[0].tolist(), weights.knots.tolist(), strict=True):
@@ -81,7 +80,7 @@ class PreviewCurve:
 
 
 def _slope_operator(steps: int) -> Floats:
-    """(steps + 1, steps + 1) takes values at even nodes to the slopes of their cubic spline, not-a-knot at the ends.
+    """(steps + 1, steps + 1) matrix from values at even knots to slopes of their cubic spline, not-a-knot at the ends.
 
     de Boor 1978, *A Practical Guide to Splines*, chapter IV.
     """

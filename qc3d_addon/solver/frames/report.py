@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake tells about itself."""
+"""The report of a bake."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Certificate:
-    """The proof of one frame's map: all determinants of its Jacobians are positive where ``folds`` is 0.
+    """The certificate of one frame's map, which has no folds exactly if all determinants of its Jacobians are positive.
 
     Parameters
     ----------
-    time
+    time : float
         Time of the frame within its pair of keys, 0..1.
-    folds
-        Tetrahedra that the frame's map does not keep positively oriented.
-    smallest_determinant
-        The smallest determinant of the map's Jacobians.
-    place
+    folds : int
+        Number of tetrahedra that the frame's map inverts or flattens.
+    smallest_determinant : float
+        Smallest determinant of the map's Jacobians.
+    place : list of float
         Where that is: x, y, z in the keys' coordinates.
-    repaired
+    repaired : bool
         Whether folds of the interpolated map had to be removed.
     """
 
@@ -45,7 +45,7 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Folds:
-    """Folded tetrahedra: of the fitted maps together, and of each frame's map; None in mode ``straight``."""
+    """Numbers of folded tetrahedra: in all fitted maps, and in each frame's map; None in mode ``straight``."""
 
     map: int | None
     frames: list[int] | None
@@ -53,7 +53,7 @@ class Folds:
 
 @dataclass(frozen=True)
 class WorstStretch:
-    """The edge that leaves the interval between its lengths in the two keys farthest.
+    """The edge that is farthest outside the interval between its lengths in the two keys.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class PlayedReport:
 
 @dataclass
 class BakeReport:
-    """Everything that a bake tells about itself.
+    """The report of a bake.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One piece of work as plain arrays: which keys to go through, which fits are known, which frames are wanted."""
+"""Tasks: which keys to go through, which fits are known, and which frames to compute, as plain arrays."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ class Task:
     Parameters
     ----------
     pairs : dict
-        The pair of every two keys that follow each other, by their names.
+        The pairs of consecutive keys, by the names of the two keys.
     through : tuple of str
         Names of the keys from the first to the last.
     fit_options : FitOptions
     frame_options : FrameOptions
     times : (k,)
-        Times of the frames, 0 the first key and 1 the last; empty where only the fits are wanted.
+        Times of the frames, from 0 at the first key to 1 at the last; empty if only the fits are wanted.
     kept : dict
-        Stored fits, by the names of their keys, that need not be made again.
+        Stored fits, by the names of their keys, that need not be computed again.
     collider : Collider, optional
-        What the frames must not touch, at each of the keys ``through``.
+        The collider at each of the keys ``through``.
     play : PlayOptions, optional
         Where given, the frames are those that a control needs to play the motion, in place of those at ``times``, and
         the report says what it plays between them.
@@ -105,16 +105,16 @@ class Task:
 
     @property
     def frame_count(self) -> int:
-        """How many frames have to be made."""
+        """Number of frames to compute."""
         return len(self.times) if self.moments is None else len(self.moments.times)
 
     @property
     def new_fits(self) -> int:
-        """How many fits of the mesh have to be made."""
+        """Number of fits of the mesh to compute."""
         return len(self.pairs) - len(self.kept) if self.needs_fits else 0
 
     def require_memory(self, limit_mb: float) -> None:
-        """Raise InputError, before anything is begun, where the work needs more megabytes than this; 0 for no limit."""
+        """Raise InputError, before the work starts, if it needs more than ``limit_mb`` megabytes; 0 means no limit."""
         pair, quality = next(iter(self.pairs.values())), self.fit_options.quality
         vertices, triangles = len(pair.key0), len(pair.faces)
         needed = estimated_mb(vertices, len(self.pairs), self.frame_count, quality, self.needs_fits, triangles)
@@ -124,14 +124,14 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of a task.
+    """The outcome of a task.
 
     Parameters
     ----------
     fits : dict
-        The stored fit of every pair by the names of its keys; none where the task needs none.
+        The stored fit of each pair, by the names of its keys; empty if the task needs no fits.
     bake : Bake or None
-        The frames; None where none were wanted.
+        The frames; None if none were wanted.
     """
 
     fits: dict[Ends, bytes]
@@ -139,7 +139,7 @@ class Outcome:
 
 
 def carry_out(task: Task) -> Steps[Outcome]:
-    """Make the fits that are missing, then the frames.
+    """Compute the missing fits, then the frames. All bakes go this way.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a control plays between the shapes that it has: the weight of each shape at every position of the control."""
+"""Weights of a control: how much of each shape it shows at each of its positions."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ from scipy.interpolate import CubicSpline
 from ..arrays import Floats, Ints
 from ..errors import InputError
 
-# Knots are the cubic spline's own from so many on; through fewer goes one polynomial.
-_LEAST_DISTANCE = 1e-6
+_LEAST_DISTANCE = 1e-6  # between knots: closer ones would give weights of very large slopes
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Weights of shapes at knots: piecewise cubic functions of the control's position, one for each shape.
+    """Weights of shapes at knots: one piecewise cubic function of the control's position for each shape.
 
-    Function i is 1 at knot i and 0 at all others. All of them add up to 1 everywhere. Before the first knot and beyond
-    the last they go on along their end, in straight lines.
+    Function i is 1 at knot i and 0 at all other knots, and all functions sum to 1 everywhere. Outside the knots, they
+    continue linearly.
 
     Parameters
     ----------
     knots : (k,)
-        Positions of the shapes, increasing, two or more.
+        Positions of the shapes, increasing; at least two.
     slopes : (2, k, k)
-        The slope of function i at knot j, ``slopes[:, j, i]``, just before and just after the knot.
+        ``slopes[:, j, i]`` is the slope of function i just before and just after knot j.
     """
 
     knots: Floats
@@ -39,17 +38,18 @@ class Weights:
 
     @classmethod
     def smooth(cls, knots: ArrayLike, corners: Sequence[int] = ()) -> Weights:
-        """Cardinal functions of the cubic spline through the knots, "not a knot" at the ends.
+        """Cardinal functions of the cubic spline with the given knots, not-a-knot at the ends.
 
-        Through three knots that is the parabola, through two the straight line. The spline through the shapes leaves
-        a smooth path of time step h by the order h^4, where straight blends leave it by h^2 (de Boor 1978, *A Practical
+        With three knots it is a parabola, with two a straight line. For knots a distance h apart, the spline follows a
+        smooth path with an error of order h⁴, and straight blends with an error of order h² (de Boor 1978, *A Practical
         Guide to Splines*, chapter IV).
 
         Parameters
         ----------
         knots : (k,)
+            Positions of the shapes.
         corners : sequence of int
-            Numbers of inner knots at which the path turns: splines end there.
+            Indices of inner knots at which the path may have a corner; the spline is split there.
 
         Examples
         --------
@@ -69,7 +69,7 @@ class Weights:
 
     @classmethod
     def hats(cls, knots: ArrayLike) -> Weights:
-        """Piecewise linear functions: between two shapes the control plays their straight blend.
+        """Piecewise linear functions: between two shapes, the control plays their straight blend.
 
         Examples
         --------
@@ -87,7 +87,7 @@ class Weights:
         width = (knots[before + 1] - knots[before])[:, None]
         part = np.clip((wanted - knots[before])[:, None] / width, 0.0, 1.0)
         values, rest = np.eye(count), 1.0 - part
-        # Hermite's basis.
+        # Cubic Hermite basis.
         found = rest * rest * (1.0 + 2.0 * part) * values[before]
         found += part * part * (1.0 + 2.0 * rest) * values[before + 1]
         found += width * part * rest * (rest * self.slopes[1, before] - part * self.slopes[0, before + 1])
@@ -96,27 +96,28 @@ class Weights:
         return np.asarray(found)
 
     def played(self, shapes: Floats, positions: ArrayLike) -> Floats:
-        """(p, n, 3) what the control plays at positions (p,), from the shapes (k, n, 3) at its knots."""
+        """(p, n, 3) shapes that the control plays at positions (p,), given the shapes (k, n, 3) at its knots."""
         return np.tensordot(self.at(positions), shapes, axes=1)
 
 
 def fewest_knots(
     times: Floats, frames: Floats, tolerance: float, required: Sequence[int] = (), corners: Sequence[int] | None = ()
 ) -> Ints:
-    """As few knots, not always even, as play all frames within a tolerance.
+    """Choose as few knots as play all frames within a tolerance; they need not be evenly spaced.
 
     Parameters
     ----------
     times : (d,)
-        Of the frames, increasing.
+        Times of the frames, increasing.
     frames : (d, n, 3)
-        Frames of the whole motion, dense enough to stand for all of it.
-    tolerance
-        How far a vertex may be from where its frame has it, in the unit of the frames.
+        Frames of the whole motion, dense enough to represent all of it.
+    tolerance : float
+        Largest distance of a vertex from its place in a frame, in the unit of the frames.
     required : sequence of int
-        Frames that are knots in any case, such as those at keys; the first and the last always are.
-    corners : sequence of int
-        Of those, the frames at which the path turns; None for all knots, as with hats.
+        Indices of frames that must be knots, such as those at keys; the first and the last always are.
+    corners : sequence of int or None
+        Indices, among these, of the frames at which the path has a corner; None if it has one at every knot, as with
+        hats.
 
     Returns
     -------
@@ -147,7 +148,7 @@ def _checked(knots: ArrayLike) -> Floats:
 
 
 def _missed(times: Floats, frames: Floats, knots: Sequence[int], corners: Sequence[int] | None) -> Floats:
-    """(d,) how far the path through the knots is from each frame; 0 at the knots."""
+    """(d,) largest distance of a vertex in each frame from the path through the knots; 0 at the knots."""
     turning = range(1, len(knots) - 1) if corners is None else [knots.index(corner) for corner in corners]
     weights = Weights.smooth(times[list(knots)], turning)
     missed = np.linalg.norm(weights.played(frames[list(knots)], times) - frames, axis=2).max(axis=1, initial=0.0)
@@ -156,7 +157,7 @@ def _missed(times: Floats, frames: Floats, knots: Sequence[int], corners: Sequen
 
 
 def _bends(times: Floats, frames: Floats, fixed: Sequence[int]) -> Floats:
-    """(d,) how many knots the path wants up to each frame, in a unit of no meaning."""
+    """(d,) cumulative density of knots that the path needs up to each frame, in an arbitrary unit."""
     density = np.zeros(len(times))
     for first, last in pairwise(fixed):
         flat = frames[first : last + 1].reshape(last + 1 - first, -1)
@@ -169,7 +170,7 @@ def _bends(times: Floats, frames: Floats, fixed: Sequence[int]) -> Floats:
 
 
 def _placed(bends: Floats, fixed: Sequence[int], count: int) -> list[int]:
-    """About ``count`` knots, the fixed ones among them, at even steps of ``bends``."""
+    """About ``count`` knots: the fixed ones, and others evenly spaced in ``bends``."""
     free = count - len(fixed)
     wanted = bends[-1] * np.arange(1, free + 1) / (free + 1)
     return sorted({*fixed, *np.abs(bends[:, None] - wanted).argmin(axis=0).tolist()} if free else {*fixed})

@@ -27,7 +27,7 @@ NEARLY_STILL = 1e-4
 # little beyond both keys.
 MARGIN = 0.17
 # Where this part of the surface is still, it holds the whole.
-_MOST_HELD = 0.3
+_MOST_HELD = 0.04
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
 from ..settings import Mirror
-from ..triangles.topology import open_loops, welded
+from ..triangles.topology import open_loops, sides, unique_edges, vertex_components, welded
 
 # Of the size: coordinates that are meant to be 0 are no farther off in single precision.
 _ON_PLANE = 1e-6
@@ -122,11 +122,19 @@ def _is_open_across(plane: MirrorPlane, shapes: Sequence[Floats], faces: Ints) -
     if not ((low >= -plane.reach).all() or (high <= plane.reach).all()):
         return False
     on_plane = (np.abs(heights) <= plane.reach).all(axis=0)
-    if np.count_nonzero(on_plane) < 3 or on_plane.all():
+    if np.count_nonzero(on_plane) < 3:
         return False
     vertices, group = welded(shapes[0], shapes[-1])
-    corners, loop = open_loops(group[faces])
-    inside = np.bincount(loop, weights=on_plane[vertices][corners])
+    faces = group[faces]
+    # A page that lies on the plane is no half of anything.
+    labels = vertex_components(unique_edges(sides(faces)), len(vertices))
+    lies = np.zeros(len(vertices), dtype=bool)
+    for height in heights:
+        farthest = np.zeros(len(vertices))
+        np.maximum.at(farthest, labels, np.abs(height[vertices]))
+        lies |= (farthest <= plane.reach)[labels]
+    corners, loop = open_loops(faces)
+    inside = np.bincount(loop, weights=(on_plane[vertices] & ~lies)[corners])
     return bool((inside == np.bincount(loop)).any())
 
 

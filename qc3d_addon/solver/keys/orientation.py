@@ -39,11 +39,14 @@ class Reversal:
         themselves so much or become so flat.
     parts : int
         Number of mirrored components.
+    where : str
+        Which component that is, or the largest of several: how many vertices it has, and the number of one of them.
     """
 
     mirrored: float
     tangled: float
     parts: int
+    where: str
 
 
 def require_reachable(pair: KeyPair) -> Reversal:
@@ -62,12 +65,13 @@ def require_reachable(pair: KeyPair) -> Reversal:
         raise InputError(pair.far_away)
     if found.mirrored >= found.tangled:
         raise InputError(
-            "The second key is mirrored or turned inside out: no motion of a volume leads there. Choose the mode "
-            "straight, which blends along straight lines, or mirror the second key back."
+            f"The second key is mirrored or turned inside out{found.where}: no motion of a volume leads there. Choose "
+            "the mode straight, which blends along straight lines, or mirror the second key back."
         )
     raise InputError(
-        "The second key crosses itself so far, or is so flat, that more of it faces inwards than outwards: no motion "
-        "of a volume leads there. Choose the mode straight, which blends along straight lines, or repair the key."
+        f"The second key crosses itself so far, or is so flat, that more of it faces inwards than outwards{found.where}"
+        ": no motion of a volume leads there. Choose the mode straight, which blends along straight lines, or repair "
+        "the key."
     )
 
 
@@ -97,7 +101,13 @@ def reversal(pair: KeyPair) -> Reversal:
     is_part = flips & (least > _LEAST_OF_A_PART)
     total = max(float(surface[0].sum()), 1e-300)
     mirrored, tangled = (float(surface[0] @ (is_reversed & chosen)) / total for chosen in (is_real, ~is_real))
-    return Reversal(mirrored, tangled, int((is_part & is_real).sum()))
+    parts = np.flatnonzero(is_part & is_real) if mirrored >= tangled else np.flatnonzero(is_part & ~is_real)
+    where = ""
+    if len(parts) and count > 1:
+        members = np.flatnonzero((labels == parts[np.argmax(surface[0, parts])])[group])
+        most = " most of it" if len(parts) > 1 else ""
+        where = f",{most} in the part of {len(members)} vertices to which vertex {members[0]} belongs"
+    return Reversal(mirrored, tangled, int((is_part & is_real).sum()), where)
 
 
 def _in_unit_size(key: Floats) -> Floats:

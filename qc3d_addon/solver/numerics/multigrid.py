@@ -109,7 +109,7 @@ def _smoothed(level: _Level, right: _Singles, start: _Singles | None) -> _Single
         step += np.float32(2.0 * following / half) * (level.inverse_diagonal * missing)
         found += step
         weight = following
-    return found
+    return np.asarray(found, dtype=np.float32)
 
 
 def _largest_eigenvalue(matrix: csr_array, diagonal: Floats, rng: Generator) -> float:

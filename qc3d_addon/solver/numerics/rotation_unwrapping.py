@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
-from .grouped_sums import covariances_by_label, sums_by_label
+from .grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
 # Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
@@ -28,6 +28,8 @@ _MOST_SWING = 1.55 * np.pi
 # Share of a part's weight that must turn further than that: a few badly shaped triangles must not decide for the part.
 _FAIR_SHARE = 0.02
 _DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
+# Parts that turn by less than this short of half a turn, or beyond it, have two ways of about the same length.
+_HALF_TURN = np.radians(30.0)
 _MEAN_STEPS = 30  # a cap: rotations that are spread all around may have no unique mean
 _MEAN_FOUND = 1e-13  # radians; about the rounding of rotation vectors
 
@@ -54,6 +56,13 @@ class Turning:
         if self.twist.any():
             rotations = products(rotations, rotation_matrices(time * self.twist))
         return rotations
+
+    def other_way(self, chosen: Bools) -> Turning:
+        """The same rotations at 1, to which the ``chosen`` elements (m,) turn the other way round."""
+        if not chosen.any():
+            return self
+        angle = np.maximum(np.linalg.norm(self.swing, axis=1), 1e-300)[:, None]
+        return Turning(np.where(chosen[:, None], self.swing * (1.0 - 2.0 * np.pi / angle), self.swing), self.twist)
 
     @property
     def angles(self) -> Floats:
@@ -118,6 +127,24 @@ def consistent_turning(
     twists = (share > _FAIR_SHARE)[forest.labels]
     twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
+
+
+def half_turned(turning: Turning, weights: Floats, labels: Ints, rest: Floats) -> Ints:
+    """The parts whose elements turn, on average, by about half a turn, by whose numbers ``labels`` (m,) call them.
+
+    Parameters
+    ----------
+    turning : Turning
+    weights : (m,)
+        Positive weights of the elements.
+    labels : (m,) int64
+        Part of every element.
+    rest : (3,)
+        Rotation vector of what does not turn.
+    """
+    mean = np.linalg.norm(means_by_label(labels, turning.swing - rest, weights), axis=1)
+    twisted = sums_by_label(labels, turning.twist.any(axis=1).astype(np.float64)) > 0.0
+    return np.flatnonzero((np.abs(mean - np.pi) < _HALF_TURN) & ~twisted)
 
 
 def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:

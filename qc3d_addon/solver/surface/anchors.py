@@ -25,9 +25,13 @@ class ScrewAnchors:
         Positive weights of the vertices in the fit of the screws.
     labels : (n,) int64
         Component of every vertex, 0, 1, 2 and so on.
+    other_way : (p,) int64
+        Components that turn the other way round.
     """
 
-    def __init__(self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints) -> None:
+    def __init__(
+        self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints, other_way: Ints | tuple[()] = ()
+    ) -> None:
         self._key0 = key0
         moves = np.bincount(labels) >= 3
         moves[labels[still]] = False
@@ -39,6 +43,9 @@ class ScrewAnchors:
         centres = [means_by_label(parts, points, weight) for points in (source, target)]
         spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
         self._turns = best_turns(covariances_by_label(parts, weight[:, None] * spread[1], spread[0]))
+        flipped = np.isin(np.unique(labels[self._members]), other_way)
+        angles = np.maximum(np.linalg.norm(self._turns[flipped], axis=1), 1e-300)[:, None]
+        self._turns[flipped] *= 1.0 - 2.0 * np.pi / angles
         rotations = rotation_matrices(self._turns)
         shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
         self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]

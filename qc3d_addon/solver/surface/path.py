@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
-from ..numerics.rotation_unwrapping import Turning, consistent_turning
+from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned
 from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
@@ -31,6 +31,7 @@ from .end_rates import (
     stretch_slopes,
 )
 from .lengths_first import SMALL_CORRECTION, LengthsFirst
+from .rigid_parts import RigidParts
 from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
 from .tangents import tangents_of
@@ -59,6 +60,8 @@ class SurfacePath:
         How stretches are interpolated.
     free_after_turns : bool
         Whether what comes back to its place after whole turns is not still, but turns with the rest of its component.
+    other_way : (p,) int64, optional
+        Components that turn the other way round, by a full turn less.
 
     Attributes
     ----------
@@ -70,10 +73,23 @@ class SurfacePath:
         Labels of the connected components.
     turning : Turning
         How the triangles of ``deformation`` turn.
+    whole_turn : (3,)
+        Rotation vector of the motion of the whole, which is taken out of the keys; radians.
+    rest : (3,)
+        Rotation vector of what stays in place beside that motion; zero where nothing does.
+    half_turned : (p,) int64
+        Components that turn by about half a turn as one, which may as well go the other way round.
     """
 
-    def __init__(self, embedding: Embedding, law: StretchLaw = "linear", free_after_turns: bool = False) -> None:
+    def __init__(
+        self,
+        embedding: Embedding,
+        law: StretchLaw = "linear",
+        free_after_turns: bool = False,
+        other_way: Ints | None = None,
+    ) -> None:
         self._law: StretchLaw = law
+        self.whole_turn = embedding.motion.turn
         self.vertices, self._group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._apart = None
@@ -89,12 +105,13 @@ class SurfacePath:
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
-        rest = -embedding.motion.turn
+        # What stays in place turns back beside a motion that was taken out.
+        self.rest = -embedding.motion.turn if still.any() else np.zeros(3)
         neighbours = face_adjacency(usable.faces)
-        self.turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, rest)
+        turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, self.rest)
         returned = np.zeros(count, dtype=bool)
         if free_after_turns:
-            returned[usable.faces[self.turning.angles_from(rest) > np.pi]] = True
+            returned[usable.faces[turning.angles_from(self.rest) > np.pi]] = True
             still &= ~returned
         self.still = still[self._group]
         self._free = ~still
@@ -102,12 +119,17 @@ class SurfacePath:
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self.components = labels[self._group]
+        owners = labels[usable.faces[:, 0]]
+        flipped = np.zeros(0, dtype=np.int64) if other_way is None else other_way
+        self.turning = turning.other_way(np.isin(owners, flipped))
+        self.half_turned = half_turned(self.turning, usable.weights, owners, self.rest)
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
         self._lengths_first = LengthsFirst(self._key0, key1, edges, labels)
-        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels)
+        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, flipped)
+        self._rigid = RigidParts(self._key0, key1, ~self._free, weights, labels)
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
@@ -195,7 +217,7 @@ class SurfacePath:
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
         """Positions (n, 3) of all vertices: copies are as far from the one of their group as in the keys."""
-        positions = shape[self._group]
+        positions = self._rigid.placed(shape, time)[self._group]
         if self._apart is not None:
             positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
         return positions

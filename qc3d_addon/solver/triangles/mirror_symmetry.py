@@ -46,6 +46,18 @@ def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float
     >>> mirror_partners(np.array([[-1.0, 0, 0], [1.0, 0, 0], [0, 2.0, 0]]), np.array([[0, 2], [1, 2]]))
     array([1, 0, 2])
     """
+    partners = known_partners(points, edges, axis, tolerance)
+    lost = int((partners < 0).sum())
+    if lost:
+        raise InputError(
+            f"{lost} of {len(points)} vertices have no mirror image across {'xyz'[axis]} = 0; the shape must be "
+            "symmetric to be mirrored."
+        )
+    return partners
+
+
+def known_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float = TOLERANCE) -> Ints:
+    """(n,) the ``mirror_partners`` of a shape that is nearly symmetric; -1 where a vertex has none."""
     count = len(points)
     reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
     images = points.copy()
@@ -53,20 +65,14 @@ def mirror_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float
     distances, near = cKDTree(points).query(images, k=min(_MOST_TOGETHER, count), distance_upper_bound=reach)
     candidates = np.isfinite(np.reshape(distances, (count, -1)))
     near = np.reshape(near, (count, -1))
-    missing = ~candidates.any(axis=1)
-    if missing.any():
-        raise _no_symmetry(int(missing.sum()), count, axis)
-    single = candidates.sum(axis=1) == 1
-    partners = np.where(single, near[:, 0], -1)
-    if not single.all():
-        together = np.flatnonzero(~single)
+    found = candidates.sum(axis=1)
+    partners = np.where(found == 1, near[:, 0], -1)
+    together = np.flatnonzero(found > 1)
+    if len(together):
         _settle(partners, {int(vertex): near[vertex, candidates[vertex]].tolist() for vertex in together}, edges)
-    lost = int((partners < 0).sum())
-    if not lost:
-        lost = int((partners[partners] != np.arange(count)).sum())
-    if lost:
-        raise _no_symmetry(lost, count, axis)
-    return partners
+    known = np.flatnonzero(partners >= 0)
+    partners[known[partners[partners[known]] != known]] = -1
+    return np.asarray(partners)
 
 
 def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> None:
@@ -94,10 +100,3 @@ def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> No
         if len(left) == len(open_vertices):
             return
         open_vertices = left
-
-
-def _no_symmetry(lost: int, count: int, axis: int) -> InputError:
-    return InputError(
-        f"{lost} of {count} vertices have no mirror image across {'xyz'[axis]} = 0; the Basis must be symmetric to "
-        "mirror in-betweens."
-    )

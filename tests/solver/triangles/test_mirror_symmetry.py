@@ -74,5 +74,5 @@ def test_another_shape() -> None:
     points, faces = icosphere(1)
     points = points - 0.5
     points[points[:, 0] > 0.1] *= 1.1
-    with pytest.raises(InputError, match=r"\d+ of 42 vertices have no mirror image across x = 0; the Basis must"):
+    with pytest.raises(InputError, match=r"\d+ of 42 vertices have no mirror image across x = 0; the shape must"):
         mirror_partners(points, edges_of(faces))

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a slider of their own to the key itself: the same in-betweens, played by the value of the last key."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...solver.errors import InputError
+from ..bake import bookkeeping
+from ..keys import chain_shapes, shape_keys
+from ..kinds import keys_of, mesh_of
+from ..store import checks, kept_measures, names
+from ..store.records import Chain, Record
+from . import remove
+
+
+def problem(obj: bpy.types.Object, chain: Chain) -> str | None:
+    """Why the last key's value cannot play the in-betweens of a slider, or None. Quick enough for a panel."""
+    keys = keys_of(obj)
+    if chain.on_key:
+        return f"The value of '{chain.on_key}' plays them already."
+    return checks.chain_problem(keys, chain) or checks.control_problem(keys, chain.through, chain.through[0])
+
+
+def play_on_key(obj: bpy.types.Object, record: Record, chain: Chain) -> tuple[Chain, list[str]]:
+    """Let the value of the last key play the in-betweens of a slider, as they are, in place of the slider.
+
+    Returns
+    -------
+    The new chain, and sentences about what was left because the animator's own work depends on it.
+
+    Raises
+    ------
+    InputError
+        If the key cannot play them, plays others already, or something cannot be changed; nothing was changed.
+    """
+    found = problem(obj, chain)
+    if found is not None:
+        raise InputError(found)
+    keys, name = keys_of(obj), chain.through[-1]
+    if record.chain_on_key(name) is not None:
+        raise InputError(f"'{name}' plays in-betweens of its own already; remove those or these.")
+    shape_keys.require_removable(obj, chain)
+    shapes = chain_shapes.offsets_by_step(obj, chain.places, chain_shapes.step_shapes(obj, chain))
+    label = names.chain_label((name,), {*obj.keys(), *(other.slider for other in record.chains)})
+    measures = kept_measures.read(keys, chain.slider, len(mesh_of(obj).vertices))
+    moved = replace(
+        chain, slider=label, keys={}, keyframes=None, request={**chain.request, "play_on": "key"}, on_key=name
+    )
+    record.chains.append(moved)
+    places = shape_keys.Steps(chain.places, chain.corners)
+    with shape_keys.chain_written(obj, moved, shapes, places, None) as (undo, notes):
+        made = {chain.places[step]: np.asarray(shape) for step, shape in shapes.items()}
+        bookkeeping.remember(obj, record, moved, measures, made, undo)
+    return moved, [*notes, *remove.remove_chain(obj, record, chain)]

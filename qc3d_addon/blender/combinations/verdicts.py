@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which pairs of an object's keys need a combination; kept for the panel as long as Blender runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import bpy
+
+from ...solver.errors import InputError
+from ..bake.many import bakeable_keys
+from ..kinds import keys_of, mesh_of
+from ..store import checks
+from ..store.mesh_data import key_coordinates, shown_coordinates, triangles, wire_edges
+
+
+@dataclass(frozen=True)
+class PairVerdict:
+    """Whether two keys may be added.
+
+    Parameters
+    ----------
+    outer, inner : str
+        Names of the keys; the outer one carries the other along.
+    adding_is_right : bool
+    distance : float
+        About how far the sum is off, over the size.
+    text : str
+        The verdict in words.
+    """
+
+    outer: str
+    inner: str
+    adding_is_right: bool
+    distance: float
+    text: str
+
+
+_found: dict[int, list[PairVerdict]] = {}
+
+
+def judge(obj: bpy.types.Object | None) -> Iterator[float]:
+    """Judge every two of the object's keys that are relative to the same one; yields the part that is done.
+
+    What was made for keys is left out. ``found`` has the verdicts afterwards.
+
+    Raises
+    ------
+    InputError
+        If the object has no two such keys, or they cannot be used.
+    """
+    from ...solver.combinations.base import KeysOnBase
+    from ...solver.combinations.verdicts import verdicts
+
+    obj = checks.require_object(obj)
+    keys = keys_of(obj)
+    by_base: dict[str, list[str]] = {}
+    for name in bakeable_keys(obj):
+        by_base.setdefault(keys.key_blocks[name].relative_key.name, []).append(name)
+    groups = {base: names for base, names in by_base.items() if len(names) > 1}
+    if not groups:
+        raise InputError(f"'{obj.name}' has no two keys that could be on at once; add some.")
+    every = sum(len(list(combinations(names, 2))) for names in groups.values())
+    results = []
+    for base, names in groups.items():
+        # What a key adds to what it is relative to, as far as its vertex group lets it.
+        start = key_coordinates(obj, base)
+        whole = [shown_coordinates(obj, name) for name in names]
+        shapes = KeysOnBase(start, whole, triangles(mesh_of(obj)), wire_edges(mesh_of(obj)))
+        for verdict in verdicts(shapes):
+            inner = verdict.second if verdict.outer == verdict.first else verdict.first
+            results.append(
+                PairVerdict(
+                    names[verdict.outer], names[inner], verdict.adding_is_right, verdict.distance, verdict.text
+                )
+            )
+            yield len(results) / every
+    _found[keys.session_uid] = sorted(results, key=lambda one: (one.adding_is_right, -one.distance))
+
+
+def found(obj: bpy.types.Object) -> list[PairVerdict]:
+    """The verdicts of the object's keys, those that need a combination first; empty before they were judged."""
+    keys = keys_of(obj)
+    blocks = keys.key_blocks
+    return [one for one in _found.get(keys.session_uid, []) if one.outer in blocks and one.inner in blocks]

@@ -1,0 +1,230 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An object with its in-betweens written for other programs: by Blender's own exporter, then in-betweens put in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.errors import InputError
+from ...solver.files.atomic import replacing_all, require_room, require_writable
+from .. import native_files
+from ..keys import chain_keys, chain_shapes
+from ..kinds import keys_of, mesh_of, present
+from ..store import checks
+from ..store.records import Chain, Record
+from . import fbx_files, gltf_files, usd_files
+from .in_betweens import InBetweens
+
+# Readers of USD and FBX go straight from one in-between to the next.
+DENSITY = 12
+# What glTF's viewers and engines take of one key without trouble.
+_MOST_TARGETS = 8
+_MOST_EVALUATIONS = 10
+SUFFIXES = (".usda", ".usdc", ".usd", ".fbx", ".glb")
+
+
+def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> list[str]:
+    """Write an object with its shape keys and their in-betweens, and the animation over the scene's frames.
+
+    The object and the scene are as they were afterwards, whatever happens. Armatures that deform the object, and what
+    it is a child of, are written with it.
+
+    Parameters
+    ----------
+    obj
+    path
+        Its ending says the format: .usda, .usdc or .usd, .fbx, .glb.
+    density
+        How many in-betweens of each key USD and FBX get, computed from what its control plays.
+
+    Returns
+    -------
+    Sentences for the user.
+
+    Raises
+    ------
+    InputError
+        If the object has no in-betweens, the ending is another one, or the file cannot be written.
+    """
+    obj = checks.require_object(obj)
+    chains = _chains(obj)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path.name} ends in none of {', '.join(SUFFIXES)}; choose one of these formats.")
+    require_writable(path)
+    names = [key.name for key in keys_of(obj).key_blocks[1:]]
+    # Beside its place: exporters write the paths of images relative to the file's own folder.
+    size = 12 * len(mesh_of(obj).vertices) * (len(names) + (density + 1) * len(chains))
+    with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
+        native_files.require_short(unfinished, path)
+        if suffix == ".glb":
+            return _export_gltf(obj, chains, unfinished, path, size)
+        found = [in_betweens(obj, chain, density) for chain in chains]
+        if suffix == ".fbx":
+            _called(
+                lambda: bpy.ops.export_scene.fbx(
+                    filepath=str(unfinished),
+                    use_selection=True,
+                    bake_anim_use_nla_strips=False,
+                    bake_anim_use_all_actions=False,
+                    bake_anim_simplify_factor=0.0,
+                    use_mesh_modifiers=False,
+                ),
+                unfinished,
+                path,
+                size,
+            )
+            fbx_files.add_in_betweens(unfinished, mesh_of(obj).name, found)
+        else:
+            _called(
+                lambda: bpy.ops.wm.usd_export(
+                    filepath=str(unfinished), selected_objects_only=True, export_animation=True, export_shapekeys=True
+                ),
+                unfinished,
+                path,
+                size,
+            )
+            usd_files.add_in_betweens(unfinished, names, len(mesh_of(obj).vertices), found)
+    return []
+
+
+def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens:
+    """So many evenly spaced shapes that a key plays between 0 and 1, in-betweens sculpted since included.
+
+    Raises
+    ------
+    InputError
+        If shape keys of the chain are missing.
+    """
+    places = np.linspace(0.0, 1.0, density + 2)[1:-1]
+    shapes = chain_shapes.step_shapes(obj, chain)
+    played = chain.weights.played(shapes, places)
+    made = frozenset(key.name for key in chain_keys.owned_keys(keys_of(obj), chain).values())
+    return InBetweens(chain.on_key, made, places, played - shapes[0])
+
+
+def _chains(obj: bpy.types.Object) -> list[Chain]:
+    """The in-betweens that the object's keys play by their own values."""
+    chains = [chain for chain in Record.read(keys_of(obj)).chains if chain.on_key]
+    if not chains:
+        raise InputError(
+            f"'{obj.name}' has no in-betweens on a key's own value, which is where other programs have them; bake some "
+            "with Play On set to Key."
+        )
+    return chains
+
+
+def _export_gltf(
+    obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path, size: int
+) -> list[str]:
+    """Targets as they are in Blender, their weights written down at every frame."""
+    _called(
+        lambda: bpy.ops.export_scene.gltf(filepath=str(unfinished), export_format='GLB', use_selection=True),
+        unfinished,
+        path,
+        size,
+    )
+    frames, values = _values_over_time(obj)
+    render = present(bpy.context.scene).render
+    names = [key.name for key in keys_of(obj).key_blocks]
+    seconds = frames * (render.fps_base / render.fps)
+    gltf_files.set_weight_animation(unfinished, obj.name, names, seconds, values)
+    return [
+        f"'{chain.on_key}' has {len(chain.keys)} in-betweens, and engines take {_MOST_TARGETS} without trouble; "
+        "re-bake it with fewer."
+        for chain in chains
+        if len(chain.keys) > _MOST_TARGETS
+    ]
+
+
+def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The scene's frames (f,), and the values (f, k) that the object's shape keys have there."""
+    scene = present(bpy.context.scene)
+    before = scene.frame_current, scene.frame_subframe
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    values = np.empty((len(frames), len(keys_of(obj).key_blocks)))
+    try:
+        for row, frame in enumerate(frames):
+            scene.frame_set(frame)
+            values[row] = _settled_values(obj)
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    return np.array(frames, dtype=np.float64), values
+
+
+def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
+    """(k,) the values of the object's shape keys now.
+
+    Blender's threads now and then evaluate a driver before the one that it reads, one time in a thousand on a machine
+    with much to do: two evaluations that agree are right.
+    """
+    found = _values(obj)
+    for _ in range(_MOST_EVALUATIONS):
+        keys_of(obj).update_tag()
+        present(bpy.context.view_layer).update()
+        before, found = found, _values(obj)
+        if np.array_equal(before, found):
+            break
+    return found
+
+
+def _values(obj: bpy.types.Object) -> NDArray[np.float64]:
+    keys = keys_of(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    return np.array([0.0 if key.mute else key.value for key in keys.key_blocks])
+
+
+@contextmanager
+def _alone(obj: bpy.types.Object) -> Iterator[None]:
+    """Let the object be selected, with what it is a child of and the armatures that deform it, and nothing else."""
+    layer = present(bpy.context.view_layer)
+    together = {obj}
+    for modifier in obj.modifiers:
+        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object is not None:
+            together.add(modifier.object)
+    above = obj.parent
+    while above is not None:
+        together.add(above)
+        above = above.parent
+    selected, active = set(present(bpy.context.selected_objects)), layer.objects.active
+    hidden = [one for one in together if one.name not in layer.objects]
+    if hidden:
+        raise InputError(f"'{hidden[0].name}' is not in this view layer; switch its collection on first.")
+    try:
+        _select(layer, together, obj)
+        yield
+    finally:
+        _select(layer, selected, active)
+
+
+def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:
+    for one in layer.objects:
+        one.select_set(one in objects, view_layer=layer)
+    layer.objects.active = active
+
+
+def _called(exporter: Callable[[], object], unfinished: Path, path: Path, size: int) -> None:
+    """Run one of Blender's exporters, which writes a file of about ``size`` bytes.
+
+    Raises
+    ------
+    InputError
+        If it is not there or fails.
+    """
+    try:
+        result = exporter()
+    except AttributeError as error:
+        raise InputError(f"Blender's exporter for {path.suffix} is switched off; enable its add-on first.") from error
+    except RuntimeError as error:
+        words = native_files.words(error, unfinished, path)
+        require_room(path, size)  # exporters call a full disk anything
+        raise InputError(f"{path} cannot be written: {words}.") from error
+    if result != {'FINISHED'} or not unfinished.exists():
+        require_room(path, size)
+        raise InputError(f"{path} was not written by Blender's exporter; try another folder.")

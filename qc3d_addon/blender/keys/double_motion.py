@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves the mesh a second time beside in-betweens: keys of theirs that are on by themselves, other sliders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import bpy
+
+from .. import compat
+from ..kinds import expect, keys_of
+from ..store.records import Chain
+from . import drivers
+from .chain_keys import owned_keys
+from .control import value_path
+
+
+def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) -> list[str]:
+    """Sentences about what adds to what the control of a chain shows; quick enough for a panel.
+
+    Parameters
+    ----------
+    chains
+        All of the object's.
+    """
+    keys = keys_of(obj)
+    if chain.on_key:
+        return []
+    found = [_on_by_itself(key) for key in _own_keys(keys, chain)]
+    return [sentence for sentence in found if sentence] + list(_shown_twice(keys, chain, chains))
+
+
+def _own_keys(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.ShapeKey]:
+    """The user's keys that a slider goes through, but the Basis."""
+    for name in dict.fromkeys(chain.through):
+        key = keys.key_blocks.get(name)
+        if key is not None and key != keys.reference_key:
+            yield key
+
+
+def _on_by_itself(key: bpy.types.ShapeKey) -> str:
+    """What moves a key beside the slider; empty where nothing does."""
+    keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
+    animation = keys.animation_data
+    if key.mute:
+        return ""
+    if animation is not None and animation.drivers.find(path) is not None:
+        return f"Key '{key.name}' is driven, which adds to what the slider shows."
+    if compat.is_animated(keys, path):
+        return f"Key '{key.name}' is animated, which adds to what the slider shows."
+    if key.value != 0.0:
+        return f"Key '{key.name}' is on by itself ({key.value:.2f}), which adds to what the slider shows; set it to 0."
+    return ""
+
+
+def _shown_twice(keys: bpy.types.Key, chain: Chain, chains: Sequence[Chain]) -> Iterator[str]:
+    """Other sliders that show the first key together with this one, each at its start."""
+    first = chain.through[0]
+    for other in chains if first != keys.reference_key.name else ():
+        is_slider = other.slider != chain.slider and not other.on_key and not other.mirror_of
+        if is_slider and other.through[0] == first and other.through != chain.through:
+            yield f"The slider '{other.slider}' starts at '{first}' too, which then shows twice; keep one of them."
+
+
+def unknown_inbetweens(keys: bpy.types.Key, chain: Chain, chains: Sequence[Chain]) -> Iterator[str]:
+    """Sentences about keys that the same key's value plays and no record knows, as after a record was forgotten."""
+    known = {value_path(key.name) for other in chains for key in owned_keys(keys, other).values()}
+    for path, curve in drivers.driven_by(keys, value_path(chain.on_key)).items():
+        if path not in known and path.endswith(".value") and len(curve.keyframe_points) > 1:
+            name = bpy.utils.unescape_identifier(path.removeprefix('key_blocks["').removesuffix('"].value'))
+            yield f"Key '{name}' plays on '{chain.on_key}' too, from a bake that is not known any more; delete it."

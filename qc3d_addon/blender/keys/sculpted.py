@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In-betweens that are the user's by now: sculpted since they were baked, or locked. A new bake keeps them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import bpy
+import numpy as np
+
+from ...solver.errors import InputError
+from ..kinds import keys_of, mesh_of
+from ..store import kept_shapes
+from ..store.kept_shapes import Shape, Shapes
+from ..store.mesh_data import key_coordinates
+from ..store.records import LEAST_DISTANCE, Chain
+from .chain_keys import base_key, owned_keys
+
+T = TypeVar("T")
+_ROUNDING = 4e-7  # of the coordinates: what moving a shape along with another one changes
+
+
+class Held(NamedTuple):
+    """One in-between that a new bake keeps."""
+
+    name: str
+    current: Shape
+    correction: Shape
+    is_locked: bool
+
+
+@dataclass(frozen=True)
+class Sculpted:
+    """The in-betweens of a chain that a new bake keeps.
+
+    Parameters
+    ----------
+    held
+        By place.
+    before
+        What the bake before wrote, by place; empty where that is not known.
+    """
+
+    held: dict[float, Held]
+    before: Shapes
+
+    @classmethod
+    def of(cls, obj: bpy.types.Object, chain: Chain) -> Sculpted:
+        """Those of an earlier bake of a chain, none where there was none."""
+        keys = keys_of(obj)
+        owned = owned_keys(keys, chain)
+        kept = kept_shapes.read(keys, chain.slider, len(mesh_of(obj).vertices)) if owned else None
+        base_before, before = kept or (np.empty((0, 3), np.float32), {})
+        base = key_coordinates(obj, base_key(keys, chain).name)
+        held = {}
+        for step, key in owned.items():
+            place, current = chain.places[step], key_coordinates(obj, key.name)
+            written = _at(before, place)
+            correction = np.zeros_like(current) if written is None else _moved(current, written, base, base_before)
+            if key.lock_shape or correction.any():
+                held[place] = Held(key.name, current, correction, key.lock_shape)
+        return cls(held, before)
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Places between the ends at which there has to be an in-between again."""
+        return tuple(place for place in self.held if 0.0 < place < 1.0)
+
+    def require_among(self, places: tuple[float, ...]) -> None:
+        """Raise InputError where a new bake has no step at the place of one of them."""
+        for place in self.places:
+            if _at(dict.fromkeys(places, True), place) is None:
+                raise InputError(f"'{self.held[place].name}' was sculpted or locked meanwhile; bake again to keep it.")
+
+    def kept(self, places: tuple[float, ...], shapes: dict[int, Shape]) -> tuple[dict[int, Shape], Shapes, list[str]]:
+        """Shapes by step as they are to be written, those to remember by place, and sentences about what was kept."""
+        written, remembered, sentences = {}, {}, []
+        for step, shape in shapes.items():
+            held = _at(self.held, places[step])
+            written[step], remembered[places[step]] = shape, shape
+            if held is not None and held.is_locked:
+                written[step] = held.current
+                earlier = _at(self.before, places[step])
+                remembered[places[step]] = held.current if earlier is None else earlier
+                sentences.append(f"'{held.name}' is locked and was left as it is.")
+            elif held is not None:
+                written[step] = shape + held.correction
+                sentences.append(f"'{held.name}' keeps what was sculpted into it; delete it to have it made anew.")
+        return written, remembered, sentences
+
+
+def _at(found: dict[float, T], place: float) -> T | None:
+    """What is at a place, or next to nothing from it."""
+    return next((value for other, value in found.items() if abs(other - place) < LEAST_DISTANCE), None)
+
+
+def _moved(current: Shape, written: Shape, base: Shape, base_before: Shape) -> Shape:
+    """(n, 3) what was sculpted into a key: not what moved together with the key that it is relative to.
+
+    Blender moves keys along when that one is edited; scripts do not.
+    """
+    difference = (current - base) - (written - base_before)
+    rounding = _ROUNDING * np.abs(current).max(initial=0.0)
+    difference[(current == written) | (np.abs(difference) <= rounding)] = 0.0
+    return np.asarray(difference, dtype=np.float32)

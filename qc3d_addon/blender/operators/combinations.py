@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators for keys that are on at once."""
+
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ...solver.errors import InputError, QC3DError
+from .. import compat, live_scrub
+from ..combinations import combine, verdicts
+from ..kinds import keys_of, present
+from ..store import checks, combined_keys
+from .common import OperatorMixin, Status, poll_active_object
+
+
+class CombinationWork(OperatorMixin):
+    """Does something with keys that are on at once, step by step; an operator says what by ``work``."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def work(self, context: bpy.types.Context) -> Iterator[object]:
+        """The parts that are done, at last a sentence for the user; raises QC3DError where nothing was changed."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> Status:
+        live_scrub.end()
+        manager = present(context.window_manager)
+        manager.progress_begin(0.0, 1.0)
+        said = ""
+        try:
+            with compat.interruptible():
+                for step in self.work(context):
+                    if isinstance(step, float):
+                        manager.progress_update(step)
+                    else:
+                        said = str(step)
+        except KeyboardInterrupt:
+            self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
+            return {'CANCELLED'}
+        except QC3DError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        finally:
+            manager.progress_end()
+        self.report({'INFO'}, said)
+        return {'FINISHED'}
+
+
+class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
+    """Make keys that correct two keys, or three, where these are on at once; they themselves stay as they are"""
+
+    bl_idname = "qc3d.combine_keys"
+    bl_label = "Combine Keys"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    if TYPE_CHECKING:
+        first: str
+        second: str
+        third: str
+        find_order: bool
+    else:
+        first: StringProperty(name="Key", description="One of the keys", options={'SKIP_SAVE'})
+        second: StringProperty(name="And", description="Another one", options={'SKIP_SAVE'})
+        third: StringProperty(name="And", description="A third one; none where left empty", options={'SKIP_SAVE'})
+        find_order: BoolProperty(
+            name="Find the Outer Key",
+            description="Find out which key carries the others along; else the first does, and the second the third",
+            default=True,
+            options={'SKIP_SAVE'},
+        )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        if self.first and self.second:
+            return self.execute(context)
+        present(context.window_manager).invoke_props_dialog(self)
+        return {'RUNNING_MODAL'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, keys = present(self.layout), keys_of(present(context.active_object))
+        for name in ("first", "second", "third"):
+            layout.prop_search(self, name, keys, "key_blocks", icon='SHAPEKEY_DATA')
+        layout.prop(self, "find_order")
+
+    def work(self, context: bpy.types.Context) -> Iterator[object]:
+        chosen = [name for name in (self.first, self.second, self.third) if name]
+        for step in combine.combine(context.active_object, chosen, self.find_order):
+            yield step.text if isinstance(step, combine.Made) else step
+
+
+class QC3D_OT_judge_pairs(CombinationWork, bpy.types.Operator):
+    """Find out which pairs of this object's keys are right when they are added, and which need a combination"""
+
+    bl_idname = "qc3d.judge_pairs"
+    bl_label = "Judge All Pairs"
+    bl_options = {'REGISTER'}  # nothing in the file changes
+
+    def work(self, context: bpy.types.Context) -> Iterator[object]:
+        yield from verdicts.judge(context.active_object)
+        found = verdicts.found(checks.require_object(context.active_object))
+        needing = sum(not one.adding_is_right for one in found)
+        yield f"{needing} of {len(found)} pairs need a combination; adding is right for the others."
+
+
+class QC3D_OT_remove_combination(CombinationWork, bpy.types.Operator):
+    """Remove the keys that correct these; they themselves stay as they are"""
+
+    bl_idname = "qc3d.remove_combination"
+    bl_label = "Remove Combination"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    if TYPE_CHECKING:
+        label: str
+    else:
+        label: StringProperty(
+            name="Keys", description="The keys, joined by +, as the panel has them", options={'SKIP_SAVE'}
+        )
+
+    def work(self, context: bpy.types.Context) -> Iterator[object]:
+        obj = checks.require_object(context.active_object)
+        chosen = next((one for one in combined_keys.read(keys_of(obj)) if one.label == self.label), None)
+        if chosen is None:
+            raise InputError(f"There is no combination of '{self.label}'; choose one that the panel lists.")
+        for note in combine.remove(obj, chosen):
+            self.report({'WARNING'}, note)
+        yield f"What was made for {chosen.label} was removed."

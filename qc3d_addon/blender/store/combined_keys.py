@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which shape keys correct others that are on at once: remembered with the shape keys, never guessed from names."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+
+import bpy
+
+from ...solver.errors import InputError
+from . import id_properties
+from . import stored_values as stored
+
+PROPERTY = "qc3d_combinations"
+_MOST_KEYS = 4
+
+
+@dataclass(frozen=True)
+class Combined:
+    """What was made for some keys.
+
+    Parameters
+    ----------
+    keys : tuple of str
+        Names of the keys, the outermost first.
+    made : tuple of (str, tuple of float)
+        Names of the keys that correct them, each with the values of the keys at which it is fully on.
+    """
+
+    keys: tuple[str, ...]
+    made: tuple[tuple[str, tuple[float, ...]], ...]
+
+    @classmethod
+    def from_json(cls, values: object) -> Combined:
+        """What ``dataclasses.asdict`` makes of it; raises ValueError, KeyError or TypeError for anything else."""
+        found = stored.plain_dict(values)
+        keys = tuple(stored.name(name) for name in stored.plain_list(found["keys"]))
+        made = []
+        for entry in stored.plain_list(found["made"]):
+            name, places = stored.plain_list(entry)
+            made.append((stored.name(name), tuple(stored.number(one, 0.0, 1.0) for one in stored.plain_list(places))))
+        if not 2 <= len(set(keys)) == len(keys) <= _MOST_KEYS or any(len(places) != len(keys) for _, places in made):
+            raise ValueError("not keys that are on at once")
+        return cls(keys, tuple(made))
+
+    @property
+    def label(self) -> str:
+        """The keys in words."""
+        return " + ".join(self.keys)
+
+
+def read(keys: bpy.types.Key) -> list[Combined]:
+    """What was made for keys that are on at once, as far as it is still there.
+
+    Raises
+    ------
+    InputError
+        If what is remembered is damaged.
+    """
+    text = keys.get(PROPERTY)
+    if text is None:
+        return []
+    try:
+        every = [Combined.from_json(entry) for entry in stored.plain_list(stored.parse(text)["combinations"])]
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"What is remembered of combinations on '{keys.name}' is damaged; delete the custom property '{PROPERTY}' "
+            "of the shape keys, whose keys then are yours."
+        ) from error
+    there = [Combined(one.keys, tuple(made for made in one.made if is_driven(keys, made[0]))) for one in every]
+    return [one for one in there if one.made]
+
+
+def write(keys: bpy.types.Key, combinations: list[Combined], undo: ExitStack) -> None:
+    """Remember them in place of what was; closing ``undo`` takes it back."""
+    if combinations:
+        text = json.dumps({"version": 1, "combinations": [asdict(one) for one in combinations]}, allow_nan=False)
+        id_properties.put(keys, PROPERTY, text, undo)
+    else:
+        id_properties.remove(keys, PROPERTY, undo)
+
+
+def names_made(keys: bpy.types.Key) -> set[str]:
+    """Names of all keys that correct others."""
+    return {name for one in read(keys) for name, _ in one.made}
+
+
+def is_driven(keys: bpy.types.Key, name: str) -> bool:
+    """Whether there is a key of that name whose value a driver gives."""
+    if name not in keys.key_blocks or keys.animation_data is None:
+        return False
+    path = f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
+    return keys.animation_data.drivers.find(path) is not None

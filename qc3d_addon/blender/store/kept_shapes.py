@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake wrote into its shape keys, kept with them, so that the next one knows what was sculpted since."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+import zlib
+from contextlib import ExitStack
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from . import id_properties
+from .names import MAX_STEPS
+from .records import PROPERTY
+
+_HEADER = struct.Struct("<4sII")  # what it is, number of shapes, number of vertices
+_MAGIC = b"QCS1"
+
+Shape = NDArray[np.float32]
+# By the place on the control, which stays with a key where a bake changes the number of steps.
+Shapes = dict[float, Shape]
+
+
+def keep(keys: bpy.types.Key, chain: str, base: Shape, shapes: Shapes, undo: ExitStack) -> None:
+    """Keep shapes (n, 3) by place, bit for bit, and that of the key which they are relative to."""
+    stacked = np.ascontiguousarray([base, *shapes.values()], dtype="<f4").view("<u4")
+    stacked[1:] ^= stacked[:1]  # most of a mesh stands still, and becomes zeros
+    data = np.array(list(shapes), dtype="<f8").tobytes() + zlib.compress(stacked.tobytes(), 6)
+    id_properties.put(keys, _property(chain), _HEADER.pack(_MAGIC, len(shapes), len(base)) + data, undo)
+
+
+def read(keys: bpy.types.Key, chain: str, vertices: int) -> tuple[Shape, Shapes] | None:
+    """What ``keep`` kept for a chain, None where there is nothing that fits a mesh of so many vertices."""
+    data = keys.get(_property(chain))
+    if not isinstance(data, bytes) or len(data) < _HEADER.size:
+        return None
+    magic, count, kept_vertices = _HEADER.unpack_from(data)
+    start = _HEADER.size + 8 * count
+    if magic != _MAGIC or kept_vertices != vertices or not 0 <= count <= MAX_STEPS + 1 or len(data) < start:
+        return None
+    places = np.frombuffer(data, dtype="<f8", count=count, offset=_HEADER.size)
+    size = 12 * (count + 1) * vertices
+    try:
+        raw = zlib.decompressobj().decompress(data[start:], size + 1)
+    except zlib.error:
+        return None
+    if len(raw) != size or not np.isfinite(places).all():
+        return None
+    stacked = np.frombuffer(raw, dtype="<u4").reshape(count + 1, vertices, 3).copy()
+    stacked[1:] ^= stacked[:1]
+    base, *shapes = stacked.view("<f4")
+    return base, dict(zip(places.tolist(), shapes, strict=True))
+
+
+def forget(keys: bpy.types.Key, chain: str, undo: ExitStack) -> None:
+    """Remove what was kept for a chain."""
+    id_properties.remove(keys, _property(chain), undo)
+
+
+def _property(chain: str) -> str:
+    return f"{PROPERTY}_shapes_{hashlib.sha256(chain.encode()).hexdigest()[:16]}"

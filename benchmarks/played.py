@@ -5,7 +5,8 @@
 Each pair, the listed ones unless some are named, becomes two shape keys, is baked with the default settings on the
 key's own value and on a slider, and is evaluated by Blender at 49 even positions. The figures are the worst of the
 inner positions, as in ``measures``: ``edge_excess_p99`` / ``volume_dev``, and the largest distance of a vertex from the
-computed frame, over the diagonal. "new crossings" are pairs of triangles beyond those of the worse key.
+computed frame, over the diagonal. "new crossings" are pairs of triangles beyond those of the worse key, at 12 positions
+between the in-betweens.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.support.progress import finish
 
 from .catalogue import Catalogue, Floats, Ints, Pair
-from .measures import Judge
+from .measures import Judge, count_crossings
 
 POSITIONS = 49
 CONTROLS: tuple[PlayOn, ...] = ("key", "slider")
@@ -41,21 +42,19 @@ def main(arguments: list[str]) -> None:
     for pair in pairs:
         faces, first, second = pair.load()
         times = np.linspace(0.0, 1.0, POSITIONS)
-        judge = Judge(faces, first, second)
-        straight = Judge(faces, first, second, crossings=False).sequence(
-            first + times[:, None, None] * (second - first), times
-        )
+        judge = Judge(faces, first, second, crossings=False)
+        straight = judge.sequence(first + times[:, None, None] * (second - first), times)
         frames = computed(pair, faces, first, second, times)
         known = judge.sequence(frames, times)["worst"]
-        cells, crossings = [], [known["intersections"]]
+        cells, crossings = [], [new_crossings(faces, first, second, frames)]
         for control in CONTROLS:
             shapes = played(pair, faces, first, second, times, control)
             found = judge.sequence(shapes, times)["worst"]
             distance = float(np.linalg.norm(shapes - frames, axis=2).max()) / judge.diagonal
             cells.append(f"{figures(found)}, {distance:.0e}")
-            crossings.append(found["intersections"])
-        counts = f"{crossings[0]}, {max(crossings[1:])}"
-        cells = [str(pair), figures(straight["worst"]), figures(known), *cells, counts]
+            if control == "key":
+                crossings.append(new_crossings(faces, first, second, shapes))
+        cells = [str(pair), figures(straight["worst"]), figures(known), *cells, ", ".join(map(str, crossings))]
         print(f"| {' | '.join(cells)} |", flush=True)
 
 
@@ -63,6 +62,12 @@ def figures(worst: dict[str, Any]) -> str:
     """Lengths and volume of the worst position."""
     volume = "" if worst["volume_dev"] is None else f" / {worst['volume_dev']:.4f}"
     return f"{worst['edge_excess_p99']:.4f}{volume}"
+
+
+def new_crossings(faces: Ints, first: Floats, second: Floats, shapes: Floats) -> int:
+    """The most crossing pairs of triangles beyond those of the worse key, between the in-betweens."""
+    keys, between = ([count_crossings(shape, faces) or 0 for shape in some] for some in ((first, second), shapes[2::4]))
+    return max(0, *(count - max(keys) for count in between))
 
 
 def computed(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats) -> Floats:

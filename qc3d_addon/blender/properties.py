@@ -60,6 +60,7 @@ _DESCRIPTIONS = {
         "normal": "All that in-betweens need",
         "fine": "Four times as many tetrahedra: finer heat maps of volume and dilatation, mode Linear",
         "finest": "As fine as it gets; slow",
+        "exact": "As fine as the mesh itself, so that the map meets both keys; slowest, for heat maps and mode Linear",
     },
 }
 _OPTIONS = (FitOptions, FrameOptions, PlayOptions)

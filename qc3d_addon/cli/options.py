@@ -21,7 +21,7 @@ _HELP = {
     "weights": "how in-betweens are blended while they are played",
     "stretch": "how mode natural interpolates lengths",
     "engine": "method that fills the volume around the mesh with tetrahedra",
-    "quality": "resolution of the volume around the mesh",
+    "quality": "resolution of the volume around the mesh; exact: that of the mesh, with a map that meets both keys",
     "extra_turns": "full turns to add to parts that can turn freely, which two shapes alone cannot tell",
     "seed": "seed of the random samples of the engine delaunay",
 }

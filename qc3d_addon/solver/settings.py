@@ -13,7 +13,7 @@ from .errors import InputError
 Mode = Literal["natural", "linear", "straight"]
 Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
-Quality = Literal["normal", "fine", "finest"]
+Quality = Literal["normal", "fine", "finest", "exact"]
 StretchLaw = Literal["linear", "logarithmic"]
 Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
@@ -33,7 +33,8 @@ class FitOptions:
     engine
         What fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
     quality
-        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``.
+        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``; or ``exact``, with which they are as fine as
+        the surface, and the map meets both keys. That one is always filled by ``delaunay``.
     seed
         Seed of the random samples of the ``delaunay`` engine, 0 or more.
     stretch
@@ -73,6 +74,8 @@ class FitOptions:
             )
         if self.seed < 0:
             raise InputError(f"The seed is {self.seed}; it must be 0 or more.")
+        if self.quality == "exact" and self.engine == "tetwild":
+            raise InputError("The quality exact fills the volume by the engine delaunay; choose that, or auto.")
         limit = self.mesh_time_limit
         if not isinstance(limit, Real) or isinstance(limit, bool) or not limit > 0.0:
             raise InputError(f"The time limit of meshing is {limit!r}; it must be a positive number of seconds.")

@@ -74,7 +74,7 @@ def test_it_goes_on_beyond_within_the_range_of_the_key(figure: bpy.types.Object,
     np.testing.assert_array_equal(at(figure, shown, 5.0), at(figure, shown, 1.25))
 
 
-def test_a_property_a_bone_and_keyframes_play_it(figure: bpy.types.Object, shown: Shown) -> None:
+def test_a_property_a_bone_keyframes_and_a_strip_play_it(figure: bpy.types.Object, shown: Shown) -> None:
     keys = figure.data.shape_keys
     figure["smile"] = 0.0
     curve = keys.driver_add('key_blocks["Lean"].value')
@@ -109,6 +109,14 @@ def test_a_property_a_bone_and_keyframes_play_it(figure: bpy.types.Object, shown
     bpy.context.scene.frame_set(4)
     place = keys.key_blocks["Lean"].value
     assert 0.1 < place < 0.5
+    assert np.abs(shown(figure) - spline(place)).max() < 2e-6
+    animation = keys.animation_data
+    strip = animation.nla_tracks.new().strips.new("Strip", 21, animation.action)
+    if hasattr(strip, "action_slot") and strip.action_slot is None:
+        strip.action_slot = animation.action.slots[0]
+    animation.action = None
+    bpy.context.scene.frame_set(24)  # as frame 4 was
+    assert keys.key_blocks["Lean"].value == pytest.approx(place, abs=1e-6)
     assert np.abs(shown(figure) - spline(place)).max() < 2e-6
 
 

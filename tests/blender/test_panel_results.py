@@ -40,6 +40,9 @@ class Layout:
         assert default_closed
         return self, self
 
+    def separator(self) -> None:
+        pass
+
     def box(self) -> Layout:
         return self
 

@@ -104,7 +104,7 @@ def bake(window: Window, pictures: Path) -> None:
     window.ask("import sys; jobs = sys.modules['bl_ext.user_default.qc3d.blender.bake.jobs']")
     window.wait_for("jobs.current().fraction > 0.5")
     window.shoot(pictures / "quickstart-bake.png", VIEW_AND_STATUS)
-    window.wait_for("'Basis_to_Bend and twist' in bpy.context.active_object.keys()")
+    window.wait_for("'Bend and twist_50' in bpy.context.active_object.data.shape_keys.key_blocks")
     time.sleep(SETTLE)
 
 

@@ -18,10 +18,11 @@ from ...solver.errors import InputError
 from .. import compat
 from ..keys import shape_keys
 from ..keys.control import mute_path, value_path
-from ..kinds import keys_of, mesh_of, present
+from ..kinds import keys_of, present
 from ..store import checks, combined_keys, names
 from ..store.combined_keys import Combined
-from ..store.mesh_data import key_coordinates, set_key_coordinates, triangles, wire_edges
+from ..store.mesh_data import key_coordinates, set_key_coordinates
+from .halves import MirroredShapes
 from .probe import probed
 
 if TYPE_CHECKING:
@@ -113,18 +114,18 @@ def combine(
     _require_unlocked(keys, own)
     grid = list(product(PLACES, repeat=len(chosen)))
     with probed(obj, chosen, made) as shown:
-        base = shown([0.0] * len(chosen))
-        alone = {
+        asked = {
             (number, place): shown([place * (number == other) for other in range(len(chosen))])
             for number in range(len(chosen))
             for place in PLACES
         }
-        sculpted = shown([1.0] * len(chosen))
+        ends = shown([0.0] * len(chosen)), shown([1.0] * len(chosen))
     with probed(obj, chosen, own) as shown:
         present = {places: shown(places) for places in grid}
-    together_keys = KeysOnBase(
-        base, [alone[number, 1.0] for number in range(len(chosen))], triangles(mesh_of(obj)), wire_edges(mesh_of(obj))
-    )
+    mesh = MirroredShapes(obj, [*ends, *asked.values()])
+    base, sculpted, *others = mesh.shapes
+    alone = dict(zip(asked, others, strict=True))
+    together_keys = KeysOnBase(base, [alone[number, 1.0] for number in range(len(chosen))], mesh.faces, mesh.edges)
     order = outermost_first(together_keys) if find_order else tuple(range(len(chosen)))
     composer = Composer(together_keys)
     size = together_keys.diagonal
@@ -150,7 +151,7 @@ def combine(
         yield (number + 1) / len(grid)
     named = tuple(chosen[number] for number in order)
     corrections = {
-        tuple(places[number] for number in order): wanted[places] - present[places]
+        tuple(places[number] for number in order): mesh.own(wanted[places]) - present[places]
         for places in grid
         if not (is_sculpted and min(places) == 1.0)
     }

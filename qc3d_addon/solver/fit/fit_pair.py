@@ -14,6 +14,7 @@ from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair, require_sizes
 from ..keys.orientation import require_reachable
 from ..meshing.cube import fill_cube
+from ..meshing.vertex_mesh import COARSE_SHARE
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
@@ -23,9 +24,11 @@ from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
 from .fold_free import FoldFreeFitter
+from .meeting import MET, crossing_vertices, meet_keys
 
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
+_MOST_NAMED = 10  # vertices
 
 
 def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
@@ -53,37 +56,9 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = Embedding.of(pair)
-    yield Progress("mesh", 0.0)
-    with beside(partial(_way, embedding, options, seconds)) as way:
-        with timed(seconds, "mesh"):
-            filled = fill_cube(in_single_precision(embedding.key0), pair.faces, options)
-        yield Progress("mesh", 1.0)
-        yield Progress("locate", 0.0)
-        with timed(seconds, "locate"):
-            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
-            coarse = interpolation_matrix(filled.mesh, in_single_precision(embedding.key0))
-        yield Progress("locate", 1.0)
-        yield Progress("fit", 0.0)
-        path, targets = way.result()
-    with timed(seconds, "fit"):
-        fitter = FoldFreeFitter(filled.mesh, coarse, in_single_precision(embedding.weights))
-        followed = yield from staged("fit", follow_path(fitter, targets))
-    yield Progress("fit", 1.0)
-    fitted = FittedMap(
-        pair,
-        filled.mesh,
-        followed.maps,
-        followed.turns,
-        options,
-        filled.engine,
-        embedding,
-        landmarks,
-        filled.notes,
-        seconds,
-        path,
-    )
-    notes = [*filled.notes]
-    turned = half_turned_parts(path)
+    fitted = yield from (_meeting if options.quality == "exact" else _near)(embedding, options, seconds)
+    notes = [*fitted.notes]
+    turned = half_turned_parts(fitted.surface_path)
     missed = fitted.landmark_residual().rms
     if out_of_reach.parts:
         notes.append(
@@ -101,24 +76,93 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
             f"{'A part turns' if turned == 1 else f'{turned} parts turn'} by half a turn, for which both ways are as "
             "long; -1 as extra turns takes the other way."
         )
+    if options.quality == "exact":
+        notes += _missed_notes(fitted)
     return replace(fitted, notes=tuple(notes))
+
+
+def _near(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
+    """The map of a volume whose tetrahedra do not follow the vertices: it comes near the second key."""
+    faces = embedding.pair.faces
+    yield Progress("mesh", 0.0)
+    with beside(partial(_way, embedding, options, seconds)) as way:
+        with timed(seconds, "mesh"):
+            filled = fill_cube(_in_single_precision(embedding.key0), faces, options)
+        yield Progress("mesh", 1.0)
+        yield Progress("locate", 0.0)
+        with timed(seconds, "locate"):
+            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
+            rounded = interpolation_matrix(filled.mesh, _in_single_precision(embedding.key0))
+        yield Progress("locate", 1.0)
+        yield Progress("fit", 0.0)
+        path, targets = way.result()
+    with timed(seconds, "fit"):
+        fitter = FoldFreeFitter(filled.mesh, rounded, _in_single_precision(embedding.weights))
+        followed = yield from staged("fit", follow_path(fitter, [_in_single_precision(target) for target in targets]))
+    yield Progress("fit", 1.0)
+    return FittedMap(
+        embedding.pair,
+        filled.mesh,
+        followed.maps,
+        followed.turns,
+        options,
+        filled.engine,
+        embedding,
+        landmarks,
+        filled.notes,
+        seconds,
+        path,
+    )
+
+
+def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
+    """The map that meets the second key."""
+    faces = embedding.pair.faces
+    yield Progress("mesh", 0.0)
+    with beside(partial(_way, embedding, options, seconds)) as way:
+        with timed(seconds, "mesh"):
+            coarse = fill_cube(embedding.key0, faces, options, COARSE_SHARE)
+            yield Progress("mesh", 0.1)
+            fine = fill_cube(embedding.key0, faces, options)
+        yield Progress("mesh", 1.0)
+        path, targets = way.result()
+    with timed(seconds, "fit"):
+        met = yield from staged("fit", meet_keys(embedding, coarse.mesh, fine.mesh, targets))
+    yield Progress("fit", 1.0)
+    return FittedMap(
+        embedding.pair, met.mesh, met.maps, met.turns, options, fine.engine, embedding, met.landmarks, (), seconds, path
+    )
+
+
+def _missed_notes(fitted: FittedMap) -> list[str]:
+    """A sentence about the vertices that a map which is to meet the second key misses, where there are any."""
+    missed = fitted.missed()
+    worst = np.argsort(-missed, kind="stable")[: np.count_nonzero(missed > MET)]
+    if not len(worst):
+        return []
+    crossing = np.count_nonzero(crossing_vertices(fitted.embedding)[worst])
+    named = ", ".join(str(vertex) for vertex in worst[:_MOST_NAMED]) + (", …" if len(worst) > _MOST_NAMED else "")
+    return [
+        f"The map meets {len(missed) - len(worst)} of {len(missed)} vertices to {MET:.2%} of the size, and misses "
+        f"{len(worst)}, {crossing} of them where a key crosses itself: {named}."
+    ]
 
 
 def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> tuple[SurfacePath, list[Floats]]:
     """The surface path to the second key, and the shapes along it that guide the map."""
     with timed(seconds, "path"):
         path = path_between(embedding, options)
-        return path, path_to(path, in_single_precision(embedding.key1))
+        return path, path_to(path, embedding.key1)
 
 
-def _parts(count: int) -> str:
-    return "A part of the mesh is" if count == 1 else f"{count} parts of the mesh are"
-
-
-def in_single_precision(values: Floats) -> Floats:
+def _in_single_precision(values: Floats) -> Floats:
     """Values rounded to single precision.
 
     A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as keys
     that were moved, must lead to the same map.
     """
     return np.asarray(values, dtype=np.float32).astype(np.float64)
+
+
+def _parts(count: int) -> str:
+    return "A part of the mesh is" if count == 1 else f"{count} parts of the mesh are"

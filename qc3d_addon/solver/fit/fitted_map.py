@@ -140,9 +140,13 @@ class FittedMap:
         """Number of folds of a map (N, 3) at ``time`` that ``unfolded`` cannot remove."""
         return self.folds(self.unfolded(values, time)) if self.folds(values) else 0
 
-    def landmark_residual(self) -> Residual:
-        """The residual: distances of the mapped landmarks from the second key."""
+    def missed(self) -> Floats:
+        """(n,) how far the map leaves each vertex from the second key, over the bounding-box diagonal."""
         embedding = self.embedding
-        missed = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
-        missed /= self.pair.diagonal * embedding.scale
-        return Residual(float(np.sqrt(embedding.weights @ missed**2)), float(missed.max()))
+        distances = np.linalg.norm(self.landmarks @ self.mapped - embedding.key1, axis=1)
+        return np.asarray(distances / (self.pair.diagonal * embedding.scale))
+
+    def landmark_residual(self) -> Residual:
+        """Distance of the mapped landmarks from the second key."""
+        missed = self.missed()
+        return Residual(float(np.sqrt(self.embedding.weights @ missed**2)), float(missed.max()))

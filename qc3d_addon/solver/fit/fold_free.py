@@ -20,9 +20,9 @@ from ..arrays import Bools, Floats
 from ..numerics.assembly import StiffnessPattern
 from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
+from .energy_density import derivatives, energy_density, projected_blocks
 
 LANDMARK_WEIGHT = 1e4  # a larger one lowers the residual little and slows down conjugate gradients
-_VOLUME_SHARE = 0.5  # of the energy; the rest is the conformal term
 _RELATIVE_DECREASE = 1e-4  # of the energy, predicted for a full step; less ends the iteration
 _CG_TOLERANCE = 1e-3  # relative; a Newton direction need not be more accurate than its quadratic model
 _CG_ITERATIONS = 400  # at most
@@ -39,7 +39,7 @@ class FoldFreeFitter:
     landmarks : (n, N) sparse
         Barycentric coordinates of the landmarks: a map with values (N, 3) sends them to ``landmarks @ values``.
     weights : (n,)
-        Positive weights of the landmarks, with the sum 1.
+        Positive weights of the landmarks, with the sum 1 or, for landmarks that pull harder, more.
     """
 
     def __init__(self, mesh: TetMesh, landmarks: csr_array, weights: Floats) -> None:
@@ -76,9 +76,13 @@ class FoldFreeFitter:
             step = self._newton_step(gradient, blocks)
             slope = float((gradient * step).sum())
             length, values = self._line_search(values, step, energy, slope, misfit)
-            if length == 0.0 or (length == 1.0 and -slope < _RELATIVE_DECREASE * energy):
+            if length == 0.0 or (length == 1.0 and self._settled(-slope, energy)):
                 break
         return values
+
+    def _settled(self, decrease: float, energy: float) -> bool:
+        """Whether a full step that is to lower the energy by so much was the last."""
+        return decrease < _RELATIVE_DECREASE * energy
 
     def residuals(self, values: Floats, targets: Floats) -> Floats:
         """(n, 3) residuals: landmark positions under a map with ``values`` (N, 3), minus their targets (n, 3)."""
@@ -97,7 +101,7 @@ class FoldFreeFitter:
         determinant = determinants(jacobians)
         if determinant.min() <= 0.0:
             return np.inf
-        density = _density(np.einsum("mij,mij->m", jacobians, jacobians), determinant)
+        density = energy_density(np.einsum("mij,mij->m", jacobians, jacobians), determinant)
         return float(self.mesh.volumes @ density) + misfit.at(values)[0]
 
     def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
@@ -106,12 +110,12 @@ class FoldFreeFitter:
         volumes = self.mesh.volumes
         squares = np.einsum("mij,mij->m", jacobians, jacobians)
         cofactor = cofactors(jacobians)
-        terms = _density_derivatives(squares, determinants(jacobians))
+        terms = derivatives(squares, determinants(jacobians))
         stress = terms.linear[:, None, None] * jacobians + terms.slope[:, None, None] * cofactor
         missed, misfit_gradient = misfit.at(values)
         gradient = self.mesh.divergence(volumes[:, None, None] * stress) + misfit_gradient
         gradient[~self._free] = 0.0
-        blocks = _projected_blocks(volumes, self.mesh.gradients, jacobians, cofactor, squares, terms)
+        blocks = projected_blocks(volumes, self.mesh.gradients, jacobians, cofactor, squares, terms)
         return float(volumes @ terms.density) + missed, gradient, blocks
 
     def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
@@ -184,75 +188,6 @@ class Misfit:
         curved = LANDMARK_WEIGHT * (self.matrix @ change)
         cost = self.at_origin + float((change * (self.slope + 0.5 * curved)).sum())
         return cost, np.asarray(self.slope + curved)
-
-
-@dataclass(frozen=True)
-class _Density:
-    """Energy density of each element and its derivatives; the stress is linear * J + slope * cof(J)."""
-
-    density: Floats
-    linear: Floats
-    slope: Floats
-    mixed: Floats
-    curvature: Floats
-
-
-def _density(squares: Floats, determinant: Floats) -> Floats:
-    shape = (1.0 - _VOLUME_SHARE) / 3.0 * squares * determinant ** (-2.0 / 3.0)
-    return np.asarray(shape + 0.5 * _VOLUME_SHARE * (determinant + 1.0 / determinant))
-
-
-def _density_derivatives(squares: Floats, determinant: Floats) -> _Density:
-    """The density and its first and second derivatives with respect to |J|² and det J."""
-    shape = (1.0 - _VOLUME_SHARE) / 3.0 * determinant ** (-2.0 / 3.0)
-    shape_slope = -2.0 / 3.0 * shape / determinant
-    shape_curvature = -5.0 / 3.0 * shape_slope / determinant
-    slope = squares * shape_slope + 0.5 * _VOLUME_SHARE * (1.0 - determinant**-2)
-    curvature = squares * shape_curvature + _VOLUME_SHARE * determinant**-3
-    return _Density(_density(squares, determinant), 2.0 * shape, slope, 2.0 * shape_slope, curvature)
-
-
-def _projected_blocks(
-    volumes: Floats, gradients: Floats, jacobians: Floats, cofactor: Floats, squares: Floats, terms: _Density
-) -> Floats:
-    """(M, 4, 4, 3, 3) positive semi-definite element blocks of the Gauss-Newton matrix.
-
-    With det J linearized, the Hessian is linear * I + mixed (J Cᵀ + C Jᵀ) + curvature C Cᵀ on the span of J and its
-    cofactor matrix C, and a multiple of the identity on the complement. The 2 x 2 part is projected in closed form.
-    """
-    norm = np.sqrt(np.maximum(squares, 1e-300))
-    first = jacobians / norm[:, None, None]
-    along = np.einsum("mij,mij->m", cofactor, first)
-    second = cofactor - along[:, None, None] * first
-    across = np.sqrt(np.einsum("mij,mij->m", second, second))
-    second /= np.maximum(across, 1e-300)[:, None, None]
-    top = 2.0 * terms.mixed * norm * along + terms.curvature * along**2
-    corner = terms.mixed * norm * across + terms.curvature * along * across
-    bottom = terms.curvature * across**2
-    top, corner, bottom = _projected_2x2(terms.linear, top, corner, bottom)
-    # The factors are the gradients contracted with the two directions. All blocks of a tetrahedron are computed by one
-    # small matrix product.
-    factors = np.stack([gradients @ first.transpose(0, 2, 1), gradients @ second.transpose(0, 2, 1)], axis=3)
-    factors = factors.reshape(-1, 12, 2)
-    mixed = volumes[:, None, None] * np.stack([top, corner, corner, bottom], axis=1).reshape(-1, 2, 2)
-    rows = (factors @ mixed) @ factors.transpose(0, 2, 1)
-    blocks = np.ascontiguousarray(rows.reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4))
-    laplacian = (volumes * terms.linear)[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
-    for axis in range(3):
-        blocks[..., axis, axis] += laplacian
-    return blocks
-
-
-def _projected_2x2(
-    shift: Floats, top: Floats, corner: Floats, bottom: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Clamp the eigenvalues of shift * I + [[top, corner], [corner, bottom]] to at least 1 % of shift."""
-    mean, half = 0.5 * (top + bottom), 0.5 * (top - bottom)
-    radius = np.hypot(half, corner)
-    floor = -0.99 * shift
-    high, low = np.maximum(mean + radius, floor), np.maximum(mean - radius, floor)
-    mean, stretch = 0.5 * (high + low), 0.5 * (high - low) / np.maximum(radius, 1e-300)
-    return mean + stretch * half, stretch * corner, mean - stretch * half
 
 
 def _diagonal_blocks(matrix: bsr_array) -> Floats:

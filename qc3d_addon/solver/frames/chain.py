@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..collision.colliders import CollisionResolver, PosedCollider
 from ..fit.fitted_map import FittedMap, Residual
+from ..fit.meeting import MET
 from ..keys.halves import held_on_planes
 from ..keys.keypair import KeyPair
 from ..settings import FrameOptions
@@ -23,7 +24,7 @@ from .easing import eased
 from .frame import Frame
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
-from .report import BakeReport, Folds, crossing_notes, mirror_notes, welding_notes
+from .report import BakeReport, Folds, crossing_notes, embedding_notes, mirror_notes, welding_notes
 
 
 def chain_frames(
@@ -85,6 +86,8 @@ def chain_frames(
     crossings = [frame.crossings for frame in ordered]
     notes = [note for fitted in fits for note in fitted.notes] + [note for maker in makers for note in maker.notes]
     notes += mirror_notes(pairs[0]) + welding_notes(pairs) + crossing_notes(crossings, wanted)
+    if fits and fits[0].options.quality == "exact":
+        notes += embedding_notes([frame.certificate for frame in ordered if frame.certificate is not None], MET)
     notes += [pair.far_away for pair in pairs if pair.far_away is not None]
     report = BakeReport(
         engine=", ".join(dict.fromkeys(fitted.engine for fitted in fits)) or "none",

@@ -56,5 +56,7 @@ class Frame:
         middle = values[fitted.mesh.tets[worst]].mean(axis=0)[None]
         place = fitted.embedding.from_cube(middle if move is None else move.apply(middle), time)[0]
         folds = int((determinant <= 0.0).sum())
-        certificate = Certificate(time, folds, float(determinant[worst]), place.tolist(), repaired)
+        carried = fitted.embedding.from_cube(fitted.landmarks @ values, time)
+        missed = float(np.linalg.norm((positions - carried) / fitted.pair.diagonal, axis=1).max())
+        certificate = Certificate(time, folds, float(determinant[worst]), place.tolist(), repaired, missed)
         return cls(positions, crossings, values, certificate)

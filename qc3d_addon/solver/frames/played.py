@@ -26,7 +26,7 @@ from .weights import Weights, fewest_knots
 
 _LOOKED_AT = (0.25, 0.5, 0.75)  # places between two neighboring shapes at which what is played is measured
 _LEAST_VOLUME = 1e-6  # of the largest volume; a relative deviation of smaller ones means little
-_SAME = 1e-6  # times that differ by less are equal
+_SAME = 1e-5  # times that differ by less are equal
 
 
 @dataclass(frozen=True, eq=False)

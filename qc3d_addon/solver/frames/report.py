@@ -34,6 +34,11 @@ class Certificate:
         Where that is: x, y, z in the keys' coordinates.
     repaired : bool
         Whether folds of the interpolated map had to be removed.
+    missed
+        The largest distance of a vertex of the frame from where the map takes it, over the bounding-box diagonal. Where
+        it is nothing and there are no folds, the vertices are those of a surface that is proven not to cross itself
+        wherever the first key does not: the image of that key under the map. What is flat between the vertices is not
+        part of the proof; its crossings are counted.
     """
 
     time: float
@@ -41,6 +46,7 @@ class Certificate:
     smallest_determinant: float
     place: list[float]
     repaired: bool
+    missed: float
 
 
 @dataclass(frozen=True)
@@ -226,6 +232,18 @@ def mirror_notes(pair: KeyPair) -> list[str]:
 
 def _at(counts: list[T] | None, chosen: list[int]) -> list[T] | None:
     return None if counts is None else [counts[index] for index in chosen]
+
+
+def embedding_notes(certificates: Sequence[Certificate], met: float) -> list[str]:
+    """A sentence about frames whose vertices are all within ``met`` of where a map without folds takes them."""
+    proven = sum(one.folds == 0 and one.missed <= met for one in certificates)
+    if not proven:
+        return []
+    return [
+        f"In {proven} of {len(certificates)} frames every vertex is within {met:.2%} of the size of where a map "
+        "without folds takes the first key: on a surface that is proven to cross itself nowhere where the key does "
+        "not. Crossings of the flat triangles between them are counted."
+    ]
 
 
 def crossing_notes(crossings: Sequence[int | None], times: Floats, subject: str = "itself") -> list[str]:

@@ -29,6 +29,7 @@ _NEIGHBOURS = 16  # at this oversampling, few candidates have more neighbors ins
 _SHORT_PERCENTILE = 2.0
 _SAMPLES_OF_AN_EDGE = 0.25  # the part of an edge between two samples
 _COARSEST = 2.0
+_CELLS, _MOST_CELLS = 32, 512  # along an edge of the cube
 _MOST_CANDIDATES = 500_000  # of a surface: where it is folded more densely, further ones would be rejected anyway
 
 
@@ -132,7 +133,7 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
     return np.concatenate([samples, apart])
 
 
-def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
+def sample_cube(surface: Floats, size: SizeField, rng: Generator, widest_cell: float = np.inf) -> Floats:
     """Sample the corners, edges, faces and inside of the cube around given samples of the surface.
 
     Parameters
@@ -142,6 +143,9 @@ def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
     size : callable
         Target distance between samples at positions (n, 3).
     rng : Generator
+    widest_cell : float
+        The cube is sampled cell by cell, with the density in the middle of each; where the density changes fast, as
+        around a surface with edges of very different lengths, cells wider than so many target distances are divided.
 
     Returns
     -------
@@ -150,7 +154,7 @@ def sample_cube(surface: Floats, size: SizeField, rng: Generator) -> Floats:
     """
     samples: Floats = np.concatenate([_corners(), surface])
     for dimension in (1, 2, 3):
-        candidates = _candidates(dimension, size, rng)
+        candidates = _candidates(dimension, size, rng, widest_cell)
         radii = size(candidates)
         # Samples that are not on the cube's faces keep a distance from them, to avoid flat tetrahedra along the faces.
         gap = np.minimum(candidates, 1.0 - candidates)
@@ -169,21 +173,26 @@ def _lattice(ticks: Floats, dimension: int) -> Floats:
     return lattice
 
 
-def _candidates(dimension: int, size: SizeField, rng: Generator) -> Floats:
+def _candidates(dimension: int, size: SizeField, rng: Generator, widest_cell: float) -> Floats:
     """Random points in random order on the cube's edges (1), faces (2) or inside (3), with the density of ``size``."""
-    cells = 32
-    lattice = _lattice(np.arange(cells) / cells, dimension)
     parts = []
     for free, fixed in _pieces(dimension):
-        origin = np.broadcast_to(fixed, (len(lattice), 3)).copy()
-        origin[:, free] = lattice
-        middle = origin.copy()
-        middle[:, free] += 0.5 / cells
-        expected = _OVERSAMPLING * (1.0 / cells / size(middle)) ** dimension
-        count = np.floor(expected + rng.random(len(expected))).astype(np.int64)
-        points = np.repeat(origin, count, axis=0)
-        points[:, free] += rng.random((len(points), dimension)) / cells
-        parts.append(points)
+        cells = _CELLS
+        corners = _lattice(np.arange(cells) / cells, dimension)
+        while len(corners):
+            origin = np.broadcast_to(fixed, (len(corners), 3)).copy()
+            origin[:, free] = corners
+            middle = origin.copy()
+            middle[:, free] += 0.5 / cells
+            wanted = size(middle)
+            wide = (1.0 / cells > widest_cell * wanted) & (cells < _MOST_CELLS)
+            expected = _OVERSAMPLING * (1.0 / cells / wanted[~wide]) ** dimension
+            count = np.floor(expected + rng.random(len(expected))).astype(np.int64)
+            points = np.repeat(origin[~wide], count, axis=0)
+            points[:, free] += rng.random((len(points), dimension)) / cells
+            parts.append(points)
+            cells *= 2
+            corners = (corners[wide, None] + _lattice(np.array([0.0, 1.0]) / cells, dimension)).reshape(-1, dimension)
     candidates: Floats = np.concatenate(parts)
     return rng.permutation(candidates)
 

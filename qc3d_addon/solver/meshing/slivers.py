@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.random import Generator
 from scipy.spatial import Delaunay
@@ -49,7 +51,28 @@ def triangulate(samples: Floats) -> Ints:
     return solid
 
 
-def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
+@dataclass(frozen=True)
+class Effort:
+    """How much work goes into the shape of tetrahedra.
+
+    Parameters
+    ----------
+    sweeps
+        Smoothing sweeps over all samples.
+    rounds
+        The most rounds in which slivers are repaired.
+    angle
+        The dihedral angle below which a tetrahedron counts as a sliver, degrees.
+    """
+
+    sweeps: int = 5
+    rounds: int = 40
+    angle: float = WANTED_ANGLE
+
+
+def sliver_free(
+    samples: Floats, size: SizeField, rng: Generator, effort: Effort = Effort(), in_place: int = 0
+) -> TetMesh:
     """Move samples so that the dihedral angles of their Delaunay mesh exceed 12 degrees, as far as that is possible.
 
     First, smoothing sweeps move every sample to the weighted centroid of its tetrahedra (Chen & Holst 2011, *Efficient
@@ -65,6 +88,9 @@ def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
     size : callable
         Local distance between samples at positions (n, 3).
     rng : Generator
+    effort : Effort
+    in_place : int
+        So many samples, the first ones, are not smoothed.
 
     Returns
     -------
@@ -72,13 +98,14 @@ def sliver_free(samples: Floats, size: SizeField, rng: Generator) -> TetMesh:
         The mesh with the largest smallest angle that was found.
     """
     free = (samples != 0.0) & (samples != 1.0)
-    for _ in range(_SMOOTHING_SWEEPS):
-        samples = _held(samples, _centroids(TetMesh(samples, triangulate(samples)), size), free)
+    smoothed = free & (np.arange(len(samples)) >= in_place)[:, None]
+    for _ in range(effort.sweeps):
+        samples = _held(samples, _centroids(TetMesh(samples, triangulate(samples)), size), smoothed)
     mesh = TetMesh(samples, triangulate(samples))
     angles = smallest_dihedral_angles(mesh)
     best, best_angle = mesh, angles.min()
-    for _ in range(_REPAIR_ROUNDS):
-        slivers = mesh.tets[angles < WANTED_ANGLE]
+    for _ in range(effort.rounds):
+        slivers = mesh.tets[angles < effort.angle]
         if not len(slivers):
             break
         chosen = np.unique(slivers[np.arange(len(slivers)), rng.integers(0, 4, len(slivers))])

@@ -14,6 +14,7 @@ from typing import NamedTuple, TypeVar
 
 T = TypeVar("T")
 Step = TypeVar("Step")
+Told = TypeVar("Told")
 
 
 class Stage(NamedTuple):
@@ -101,7 +102,7 @@ def finish(steps: Generator[Step, None, T], on_progress: Callable[[Step], object
             on_progress(progress)
 
 
-def told(work: Generator[Step, None, T], progress: Callable[[Step], Progress]) -> Steps[T]:
+def told(work: Generator[Step, None, T], progress: Callable[[Step], Told]) -> Generator[Told, None, T]:
     """The same work, with each of its steps translated by ``progress``."""
     while True:
         try:

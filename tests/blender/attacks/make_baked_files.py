@@ -39,10 +39,13 @@ def main() -> None:
         key.points.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
     fit_pair.fill_cube = lambda *_: six_tetrahedra()  # so that the maps are small
     options = FrameOptions(mode="linear")
-    bake_object(obj, BakeRequest(("Basis", "Lean.L"), 3, frame_options=options, keyframes=(1, 25)))
+    way = ("Basis", "Lean.L")
+    bake_object(obj, BakeRequest(way, 3, frame_options=options, keyframes=(1, 25), play_on="slider"))
     bake_object(obj, BakeRequest(("Lean.L", "Basis", "Long"), 2, frame_options=options))
     for operator in (bpy.ops.qc3d.mirror, bpy.ops.qc3d.heat_map, bpy.ops.qc3d.absolute_keys):
-        assert operator(slider="Basis→Lean.L") == {'FINISHED'}
+        assert operator(slider="Basis_to_Lean.L") == {'FINISHED'}
+    eased = FrameOptions(mode="linear", easing="ease-in-out")
+    bake_object(obj, BakeRequest(("Basis", "Long"), 3, frame_options=eased, play_on="key"))
     version = ".".join(map(str, bpy.app.version[:2]))
     FILES.mkdir(exist_ok=True)
     path = FILES / f"baked_{version}.blend"

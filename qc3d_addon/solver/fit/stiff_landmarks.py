@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fold-free maps with landmarks that pull so hard that they are met.
+
+Two things make that possible. Conjugate gradients are preconditioned by a factored matrix in which the landmarks' own
+weight stands, so that they need no more steps for a larger one. And where a few tetrahedra would fold, only what is
+around them takes a shorter step.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import SuperLU
+
+from ..arrays import Floats
+from ..numerics.conjugate_gradients import conjugate_gradients
+from ..numerics.nested_dissection import elimination_order, factored
+from ..numerics.rotations import determinants
+from ..tets.mesh import TetMesh
+from .fold_free import LANDMARK_WEIGHT, FoldFreeFitter, Misfit
+
+_TOLERANCE = 0.06
+_PRODUCTS = 5, 120  # fewer have not seen more than the stiffest equations
+_MANY_PRODUCTS = 25  # after so many the preconditioner is made anew
+_SETTLED = 3e-2  # of what the energy is above its least, the identity's 1
+_HALVINGS = 9
+_LEAST_LENGTH = 1e-3  # of a step that is worth another one
+_LEAST_LEFT = 0.25  # a tetrahedron keeps this part of its determinant in a step
+_GROWTH, _RINGS = 1.25, 24  # how fast steps grow again around what holds them back
+
+
+class StiffFitter(FoldFreeFitter):
+    """Fits maps of one mesh to landmarks of large weights.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    landmarks : (n, N) sparse array
+    weights : (n,)
+    """
+
+    def __init__(self, mesh: TetMesh, landmarks: csr_array, weights: Floats) -> None:
+        super().__init__(mesh, landmarks, weights)
+        pattern = self._pattern.assemble(np.ones((len(mesh.tets), 4, 4)))
+        self._order = elimination_order(mesh.points, pattern)
+        self._rank = np.argsort(self._order)
+        corners = mesh.tets.ravel()
+        self._by_vertex = np.argsort(corners, kind="stable")
+        self._starts = np.searchsorted(corners[self._by_vertex], np.arange(len(mesh.points)))
+        self._forget_factors()
+
+    def with_weights(self, weights: Floats) -> StiffFitter:
+        """A fitter of the same mesh to the same landmarks with other weights (n,)."""
+        other = copy.copy(self)
+        other._weights = weights
+        other._landmark_matrix = csr_array(self.landmarks.T @ diags_array(weights) @ self.landmarks)
+        other._landmark_blocks = other._blocks_of(other._landmark_matrix)
+        other._forget_factors()
+        return other
+
+    def _forget_factors(self) -> None:
+        self._factors: SuperLU | None = None
+
+    def _settled(self, decrease: float, energy: float) -> bool:
+        return decrease < _SETTLED * (energy - 1.0)
+
+    def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
+        matrix = self._pattern.assemble_blocks(element_blocks)
+        if self._factors is None:
+            scalar = self._pattern.assemble(np.trace(element_blocks, axis1=3, axis2=4) / 3.0)
+            scalar = csr_array(scalar + LANDMARK_WEIGHT * self._landmark_matrix)
+            self._factors = factored(csr_array(scalar[self._order][:, self._order]))
+        factors = self._factors
+        matrix.data += LANDMARK_WEIGHT * self._landmark_blocks
+        free = self._free.ravel()
+
+        def precondition(vector: Floats) -> Floats:
+            loads = (vector * free).reshape(-1, 3)[self._order]
+            return np.asarray(factors.solve(loads)[self._rank].ravel() * free)
+
+        def multiply(vector: Floats) -> Floats:
+            return np.asarray(matrix @ (vector * free) * free)
+
+        load = -gradient.ravel()
+        step, products = conjugate_gradients(multiply, precondition, load, _TOLERANCE, _PRODUCTS)
+        if products > _MANY_PRODUCTS:
+            self._factors = None
+        return step.reshape(-1, 3)
+
+    def _line_search(
+        self, values: Floats, step: Floats, energy: float, slope: float, misfit: Misfit
+    ) -> tuple[float, Floats]:
+        length, moved = super()._line_search(values, step, energy, slope, misfit)
+        if length >= 0.5:
+            return length, moved
+        held_back = values + self._lengths(values, step)[:, None] * step
+        reached = self._energy(held_back, misfit)
+        if reached < (energy if length == 0.0 else self._energy(moved, misfit)):
+            return 0.5, held_back
+        return (length, moved) if length >= _LEAST_LENGTH else (0.0, values)
+
+    def _lengths(self, values: Floats, step: Floats) -> Floats:
+        """(N,) how far each vertex may go along a step: short around tetrahedra that would fold, growing away."""
+        at, change = self.mesh.jacobians(values), self.mesh.jacobians(step)
+        least = _LEAST_LEFT * determinants(at)
+        of_tets = np.ones(len(least))
+        folding, length = np.arange(len(least)), 1.0
+        for _ in range(_HALVINGS):
+            folding = folding[determinants(at[folding] + length * change[folding]) < least[folding]]
+            if not len(folding):
+                break
+            length *= 0.5
+            of_tets[folding] = length
+        tets, owners = self.mesh.tets, self._by_vertex // 4
+        of_vertices = np.minimum.reduceat(of_tets[owners], self._starts)
+        for _ in range(_RINGS):
+            around = of_vertices[tets].min(axis=1)
+            of_vertices = np.minimum(of_vertices, _GROWTH * np.minimum.reduceat(around[owners], self._starts))
+        return np.asarray(of_vertices)

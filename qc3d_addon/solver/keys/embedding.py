@@ -62,21 +62,23 @@ class RigidMotion:
         return cls._of_turn(best_turns(covariance[None])[0], source_centre, target_centre)
 
     @classmethod
-    def of_surface(cls, source: Floats, target: Floats, faces: Ints) -> RigidMotion:
+    def of_surface(cls, source: Floats, target: Floats, faces: Ints, shares: Floats | None = None) -> RigidMotion:
         """Mean rigid motion of a surface from the shape ``source`` (n, 3) to the shape ``target`` (n, 3).
 
         The rotation is the area-weighted mean of the triangles' unwrapped rotations; the translation carries the
         centroid along. Without usable triangles, it is the least-squares fit of the positions. That fit would be wrong
-        where wings flap or ends twist: there it can be half a turn away from the rotation of every triangle.
+        where wings flap or ends twist: there it can be half a turn away from the rotation of every triangle. What
+        triangles count is multiplied by ``shares`` (m,).
         """
-        weights = vertex_areas(source, faces)
+        share = np.ones(len(faces)) if shares is None else shares
+        weights = vertex_areas(source, faces, share)
         vertices, group = welded(source, target)
         deformation = TriangleDeformation.between(source[vertices], target[vertices], group[faces])
         if not len(deformation.faces):
             return cls.between(source, target, weights)
         # Symmetric in both keys, and independent of their scale.
         sizes = np.sqrt(np.prod([areas(key[vertices], deformation.faces) for key in (source, target)], axis=0))
-        turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes)
+        turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes * share[deformation.rows])
         return cls._of_turn(turn, *(np.average(key, axis=0, weights=weights) for key in (source, target)))
 
     @classmethod
@@ -137,12 +139,14 @@ class Embedding:
     @classmethod
     def of(cls, pair: KeyPair) -> Embedding:
         """Embed a pair so that both keys, the second without its rigid motion, just fit into [0.17, 0.83]³."""
-        axes = own_axes(pair.key0, pair.key1, vertex_areas(pair.key0, pair.faces))
+        faces, shares = pair.covering
+        areas = vertex_areas(pair.key0, faces, shares)
+        axes = own_axes(pair.key0, pair.key1, areas)
         key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
         diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
         travel = np.linalg.norm(key1 - key0, axis=1) / diagonal
-        moves = _free_part(travel, vertex_areas(key0, pair.faces))
-        motion = RigidMotion.of_surface(key0, key1, pair.faces).part(moves) if moves else RigidMotion.identity()
+        moves = _free_part(travel, areas)
+        motion = RigidMotion.of_surface(key0, key1, faces, shares).part(moves) if moves else RigidMotion.identity()
         both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())
@@ -185,7 +189,7 @@ class Embedding:
     @cached_property
     def weights(self) -> Floats:
         """(n,) vertex areas of the first key, normalized to the sum 1; a loose vertex has a small positive weight."""
-        areas = vertex_areas(self.key0, self.pair.faces)
+        areas = vertex_areas(self.key0, *self.pair.covering)
         return np.asarray(areas / areas.sum())
 
 

@@ -13,8 +13,9 @@ from ...solver.errors import QC3DError
 from .. import live_scrub
 from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
 from ..bake.plan import Plan
+from ..choices import BakeChoices
 from ..kinds import keys_of, present
-from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
 from .common import Status, poll_active_object
@@ -104,6 +105,7 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
     def write_all(self, plan: Plan | None, outcome: Union["Outcome", QC3DError, None]) -> list[str]:
         live_scrub.end()
         verdicts = [one if isinstance(one, Verdict) else write_key(*one) for one in self._done]
+        show_newest(plan.locate() if plan is not None else None)
         return [*map(str, verdicts), summary(verdicts)]
 
     def _next(self, context: bpy.types.Context) -> Plan | None:

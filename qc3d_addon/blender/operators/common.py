@@ -12,7 +12,7 @@ from bpy.props import StringProperty
 from ...solver.errors import InputError
 from ..bake import jobs
 from ..kinds import keys_of, present
-from ..properties import key_names, settings_of
+from ..properties import panel_keys, settings_of
 from ..store import checks
 from ..store.records import Chain, Record
 
@@ -39,7 +39,7 @@ def poll_panel_keys(operator: type[bpy.types.Operator], context: bpy.types.Conte
     if context.region is None or context.region.type != 'UI':
         return True
     obj = present(context.active_object)
-    return _poll(operator, checks.keys_problem(keys_of(obj), key_names(settings_of(obj))))
+    return _poll(operator, checks.keys_problem(keys_of(obj), panel_keys(settings_of(obj))))
 
 
 def poll_chains(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -10,7 +10,8 @@ import bpy
 
 from ..bake.plan import Plan, plan_maps, write_maps
 from ..bake.request import BakeRequest
-from ..properties import MapChoices, fill_from_panel, fit_options, key_names, settings_of
+from ..choices import MapChoices
+from ..properties import fill_from_panel, fit_options, key_names, settings_of
 from ..store import checks
 from .child_work import ChildWork
 from .common import poll_active_object, poll_panel_keys

@@ -32,6 +32,7 @@ from ..properties import settings_of
 from ..store import checks, kept_measures, records
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
+from . import bake_list
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 
@@ -51,7 +52,7 @@ _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings
 
 
 class QC3D_PT_results(bpy.types.Panel):
-    """The sliders of the active object's in-betweens, the newest first."""
+    """The list of the active object's bakes, the newest first, and the details of the chosen one."""
 
     bl_label = "Baked In-Betweens"
     bl_space_type = 'VIEW_3D'
@@ -70,27 +71,32 @@ class QC3D_PT_results(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         obj, layout = present(context.active_object), present(self.layout)
         try:
-            chains = Record.read(keys_of(obj)).chains
+            chains = Record.read(keys_of(obj)).chains[::-1]
         except InputError as error:
             draw_sentence(context, layout, str(error), 'ERROR')
             if records.state(keys_of(obj)).is_damaged:
                 layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
             return
-        for chain in reversed(chains):
-            box = layout.box()
-            _draw_chain(context, box, obj, chain)
-            _draw_double_motion(context, box, obj, chain, chains)
+        if not chains:
+            return
+        chain = bake_list.draw(layout, obj, chains)
+        # Keys may have been deleted, so that there are fewer than bakes.
+        for left in chains[len(keys_of(obj).key_blocks) :]:
+            layout.operator(QC3D_OT_remove.bl_idname, text=f"Remove {left.slider}", icon='TRASH').slider = left.slider
+        box = layout.box()
+        _draw_chain(context, box, obj, chain, is_listed=len(chains) > 1)
+        _draw_double_motion(context, box, obj, chain, chains)
 
 
 def _draw_chain(
-    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, is_listed: bool
 ) -> None:
     control = chain_keys.control_of(obj, chain)
     control_problem = control.problem
-    if control_problem is None:
-        layout.prop(*control.shown, text=control.name, slider=True)
-    else:
+    if control_problem is not None:
         draw_sentence(context, layout, control_problem, 'ERROR')
+    elif not is_listed:  # else the list has it
+        layout.prop(*control.shown, text=control.name, slider=True)
     if chain_keys.are_drivers_stopped(keys_of(obj), chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(keys_of(obj), chain)

@@ -212,7 +212,10 @@ class SurfacePath:
         if costly:
             free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
             for shape, other in zip(costly, free, strict=True):
-                settled[shape] = self._lengths_first.mixed(settled[shape], other)
+                settled[shape] = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
+        settled = [
+            self._lengths_first.straightened(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)
+        ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:

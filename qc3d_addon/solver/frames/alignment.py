@@ -19,6 +19,9 @@ from ..numerics.rotations import rotation_matrices, rotation_vectors
 
 # Vertices that travel less than this part of all count most.
 _CALM_PERCENTILE = 25.0
+# Of the way: where a rigid motion of the whole leaves less than this, parts of it are calm to a lesser degree only; and
+# of that, what is left by rounding.
+_MOSTLY_RIGID, _EXACTLY_RIGID = 0.2, 1e-5
 # Steps of the alignment; frames are a few degrees away, and each step leaves the third power of the angle.
 _STEPS = 3
 # Of the moments of inertia: what lies in a line is not turned about it.
@@ -97,7 +100,7 @@ class CalmAlignment:
     def __init__(self, embedding: Embedding, turns: bool = False) -> None:
         self._embedding = embedding
         self._inner = (False, False)
-        self._knows = not turns
+        self._part = 0.0 if turns else _calm_part(embedding)
         self._weights = _calm_weights(embedding.travel, embedding.weights)
 
     def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
@@ -108,10 +111,23 @@ class CalmAlignment:
 
     def of(self, shape: Floats, time: float) -> RigidMove:
         """Where to carry a shape (n, 3) at ``time``, cube units."""
-        if not self._knows:
+        if not self._part:
             return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
         whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
-        return whole.scaled(_onset(time, self._inner))
+        return whole.scaled(self._part * _onset(time, self._inner))
+
+
+def _calm_part(embedding: Embedding) -> float:
+    """How much of the alignment is due, 0..1: none where everything moves as one rigid body, which has no calm parts.
+
+    Such a body moves along its screw, whose points near the axis are no calmer than they have to be.
+    """
+    left = np.linalg.norm(embedding.key1 - embedding.key0, axis=1) / embedding.scale
+    way = np.linalg.norm(embedding.pair.key1 - embedding.pair.key0, axis=1)
+    squares = [float(embedding.weights @ distance**2) for distance in (left, way)]
+    share = min(np.sqrt(squares[0] / max(squares[1], 1e-300)) / _MOSTLY_RIGID, 1.0)
+    part = max(share - _EXACTLY_RIGID, 0.0) / (1.0 - _EXACTLY_RIGID)
+    return part * part * (3.0 - 2.0 * part)
 
 
 def _calm_weights(travel: Floats, areas: Floats) -> Floats:

@@ -254,7 +254,7 @@ class TestEmbedding:
 
     def test_weights_are_the_areas(self) -> None:
         embedding = Embedding.of(bar_pair(np.zeros(3), np.ones(3)))
-        areas = vertex_areas(embedding.pair.key0, embedding.pair.faces)
+        areas = vertex_areas(embedding.pair.key0, *embedding.pair.covering)
         assert areas.sum() == pytest.approx(2.0 * 0.7 + 2.0 * 4.0 + 2.0 * 2.8, rel=1e-12)
         np.testing.assert_allclose(embedding.weights, areas / areas.sum(), rtol=1e-12)
 

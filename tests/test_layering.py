@@ -38,6 +38,7 @@ BLENDER_FLOORS = (
     ("keys",),
     ("heat_map",),
     ("bake",),
+    ("choices",),
     ("chains", "live_scrub", "properties"),
     ("combinations", "exports"),
     ("operators",),

@@ -1,214 +1,30 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user chooses for a bake, on the object's panel and as the operators' properties."""
+"""The panel's choices, kept with each object, and what operators take from them."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 import contextlib
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
-from ..solver.settings import (
-    Easing,
-    Engine,
-    FitOptions,
-    FrameOptions,
-    Mode,
-    PlayOptions,
-    Quality,
-    StretchLaw,
-    WeightKind,
-)
-from .bake.request import BakeRequest, PlayOn
+from ..solver.settings import FitOptions, FrameOptions
+from .bake.request import BakeRequest
+from .bake.suggested_keys import suggested_keys
+from .choices import BakeChoices, MapChoices
 from .heat_map import heat_map
 from .heat_map.colors import MEASURE_ITEMS
-from .kinds import expect, keys_of
+from .kinds import expect, keys_of, shape_keys_of
 from .store import checks
-from .store.names import MAX_STEPS
-from .store.records import Record
-
-_DESCRIPTIONS = {
-    "mode": {
-        "natural": "Rotations, lengths and volumes are kept",
-        "linear": "The stretch of the volume is interpolated linearly, as published",
-        "straight": "Straight lines, without a map: for keys that are mirrored or turned inside out",
-    },
-    "stretch": {
-        "linear": "Lengths grow by equal amounts",
-        "logarithmic": "Lengths grow by equal factors",
-    },
-    "easing": {
-        "linear": "Even speed",
-        "ease-in": "Starts slowly",
-        "ease-out": "Ends slowly",
-        "ease-in-out": "Starts and ends slowly",
-    },
-    "engine": {
-        "auto": "TetWild where it can run, else Delaunay",
-        "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",
-        "delaunay": "Delaunay tetrahedra of graded samples; quick, repeatable, runs everywhere",
-    },
-    "weights": {
-        "smooth": "A smooth path through the in-betweens: a few of them play the whole motion",
-        "hats": "Straight blends from each in-between to the next",
-    },
-    "quality": {
-        "normal": "All that in-betweens need",
-        "fine": "Four times as many tetrahedra: finer heat maps of volume and dilatation, mode Linear",
-        "finest": "As fine as it gets; slow",
-        "exact": "As fine as the mesh itself, so that the map meets both keys; slowest, for heat maps and mode Linear",
-    },
-}
-_OPTIONS = (FitOptions, FrameOptions, PlayOptions)
-_DEFAULTS: dict[str, Any] = {field.name: field.default for kind in _OPTIONS for field in fields(kind)}
-_KINDS = {name: hint for kind in _OPTIONS for name, hint in get_type_hints(kind).items()}
-
-
-def _choice(setting: str, description: str) -> Any:  # noqa: ANN401 - what it is only Blender knows
-    """A menu of what one of the solver's settings may be."""
-    texts = _DESCRIPTIONS[setting]
-    return EnumProperty(
-        name=setting.capitalize(),
-        description=description,
-        items=[(name, name.capitalize(), texts.get(name, "")) for name in get_args(_KINDS[setting])],
-        default=_DEFAULTS[setting],
-        options={'SKIP_SAVE'},
-    )
-
-
-class InnerKey(bpy.types.PropertyGroup):
-    """A key between the first and the last, by its name."""
-
-
-class MapChoices:
-    """The keys, and everything that the maps between them depend on."""
-
-    if TYPE_CHECKING:
-        from_key: str
-        via: "bpy.types.bpy_prop_collection_idprop[InnerKey]"
-        to_key: str
-        stretch: StretchLaw
-        extra_turns: int
-        engine: Engine
-        quality: Quality
-        seed: int
-    else:
-        from_key: StringProperty(
-            name="From", description="The shape key to start from", options={'SKIP_SAVE'}
-        )
-        via: CollectionProperty(
-            name="Through",
-            description="The shape keys to go through on the way, in their order, as [{\"name\": key}, ...]",
-            type=InnerKey,
-            options={'SKIP_SAVE'},
-        )
-        to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
-        stretch: _choice("stretch", "How the mode natural interpolates stretches")
-        extra_turns: IntProperty(
-            name="Extra Turns",
-            description="Full turns, between every two keys, that two shapes cannot tell",
-            default=_DEFAULTS["extra_turns"],
-            min=-100,
-            max=100,
-            soft_min=-5,
-            soft_max=5,
-            options={'SKIP_SAVE'},
-        )
-        engine: _choice("engine", "What fills the volume around the mesh")
-        quality: _choice("quality", "How fine the volume is")
-        seed: IntProperty(
-            name="Seed",
-            description="Of the samples that the volume is made from",
-            default=_DEFAULTS["seed"],
-            min=0,
-            options={'SKIP_SAVE'},
-        )
-
-
-class BakeChoices(MapChoices):
-    """The keys, and the in-betweens to make between them."""
-
-    if TYPE_CHECKING:
-        count: int
-        use_tolerance: bool
-        tolerance: float
-        weights: WeightKind
-        colliders: str
-        play_on: PlayOn
-        mode: Mode
-        easing: Easing
-        use_keyframes: bool
-        frame_start: int
-        frame_end: int
-    else:
-        count: IntProperty(
-            name="In-Betweens",
-            description="Number of in-betweens between every two keys, evenly spaced",
-            default=5,
-            min=1,
-            max=MAX_STEPS - 1,
-            soft_max=20,
-            options={'SKIP_SAVE'},
-        )
-        use_tolerance: BoolProperty(
-            name="As Few as Needed",
-            description="Make as few in-betweens as stay within a tolerance, where they help, "
-            "instead of a fixed number",
-            default=False,
-            options={'SKIP_SAVE'},
-        )
-        tolerance: FloatProperty(
-            name="Tolerance",
-            description="How far a vertex may be from where it should be, at any position of the slider; "
-            "a length in the object's own units, before its scale",
-            default=0.001,
-            min=1e-6,
-            soft_max=1.0,
-            precision=4,
-            step=0.01,
-            subtype='DISTANCE',
-            unit='LENGTH',
-            options={'SKIP_SAVE'},
-        )
-        weights: _choice("weights", "What is played between the in-betweens")
-        colliders: StringProperty(
-            name="Keep Off",
-            description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
-            options={'SKIP_SAVE'},
-        )
-        play_on: EnumProperty(
-            name="Play On",
-            description="What plays the in-betweens",
-            items=[
-                ("auto", "Auto", "The last key's own value where it can be, else a slider"),
-                ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
-                ("slider", "Slider", "A slider of their own, a custom property of the object"),
-            ],
-            default="auto",
-            options={'SKIP_SAVE'},
-        )
-        mode: _choice("mode", "How the map between the keys is interpolated")
-        easing: _choice("easing", "How the speed from the first key to the last changes")
-        use_keyframes: BoolProperty(
-            name="Keyframes",
-            description="Animate the slider from the first key to the last",
-            default=False,
-            options={'SKIP_SAVE'},
-        )
-        frame_start: IntProperty(
-            name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
-        )
-        frame_end: IntProperty(
-            name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
-        )
+from .store.records import Chain, Record
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
-    """Let a heat map that is on show the measure that was chosen; where it cannot, its button says why."""
+    """Switch a heat map that is shown to the chosen measure; if that is impossible, its button says why."""
     obj = expect(bpy.types.Object, settings.id_data)
     state = heat_map.shown(obj)
     if state is None or state.measure == settings.measure or checks.object_problem(obj) is not None:
@@ -219,14 +35,65 @@ def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> Non
             heat_map.show(obj, chain, settings.measure)
 
 
+def _get_first(settings: "ObjectSettings") -> str:
+    return panel_keys(settings)[0]
+
+
+def _set_first(settings: "ObjectSettings", name: str) -> None:
+    settings.from_key = name
+
+
+def _get_last(settings: "ObjectSettings") -> str:
+    return panel_keys(settings)[-1]
+
+
+def _set_last(settings: "ObjectSettings", name: str) -> None:
+    settings.to_key = name
+
+
+def _get_row(settings: "ObjectSettings") -> int:
+    sliders = [chain.slider for chain in newest_first(expect(bpy.types.Object, settings.id_data))]
+    return sliders.index(settings.chosen) if settings.chosen in sliders else 0
+
+
+def _set_row(settings: "ObjectSettings", row: int) -> None:
+    chains = newest_first(expect(bpy.types.Object, settings.id_data))
+    if 0 <= row < len(chains):
+        settings.chosen = chains[row].slider
+
+
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
-    """The panel's choices, kept with the object."""
+    """The panel's choices, kept with the object.
+
+    ``first`` and ``last`` are the keys that the panel shows: those that were chosen, and where none was, those that are
+    most likely meant. ``row`` is the row of the list of bakes that is chosen, the newest where none was.
+    """
 
     if TYPE_CHECKING:
         measure: str
+        first: str
+        last: str
+        chosen: str
+        row: int
     else:
         measure: EnumProperty(
             name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
+        )
+        first: StringProperty(
+            name="From",
+            description="The shape key to start from; what the last one is relative to where none was chosen",
+            get=_get_first,
+            set=_set_first,
+        )
+        last: StringProperty(
+            name="To",
+            description="The shape key to end with; the active one where none was chosen",
+            get=_get_last,
+            set=_set_last,
+        )
+        chosen: StringProperty(name="Bake", description="The bake that the panel shows; the newest where empty")
+        row: IntProperty(
+            name="Bake", description="The bake whose details are shown below", get=_get_row, set=_set_row
         )
 
 
@@ -251,10 +118,16 @@ def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSe
     if not any(properties.is_property_set(name) for name in ("from_key", "to_key", "via")):
         for inner in settings.via:
             properties.via.add().name = inner.name
+    left_out = [name for name in ("from_key", "to_key") if not properties.is_property_set(name)]
     shared = set(properties.bl_rna.properties.keys()) & set(settings.bl_rna.properties.keys())
     for name in shared - {"rna_type", "via"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))
+    first, last = (getattr(properties, name) for name in ("from_key", "to_key"))
+    likely = suggested_keys(expect(bpy.types.Object, settings.id_data), first, last)
+    for name, key in zip(("from_key", "to_key"), likely, strict=True):
+        if name in left_out:
+            setattr(properties, name, key)
 
 
 def fill_panel(settings: ObjectSettings, keys: tuple[str, ...], chosen: FitOptions) -> None:
@@ -266,6 +139,27 @@ def fill_panel(settings: ObjectSettings, keys: tuple[str, ...], chosen: FitOptio
     for field in fields(FitOptions):
         if hasattr(settings, field.name):
             setattr(settings, field.name, getattr(chosen, field.name))
+
+
+def newest_first(obj: bpy.types.Object) -> list[Chain]:
+    """The bakes of an object as the panel lists them; none where the record cannot be read."""
+    keys = shape_keys_of(obj) if obj.type == 'MESH' else None
+    with contextlib.suppress(InputError):
+        return [] if keys is None else Record.read(keys).chains[::-1]
+    return []
+
+
+def show_newest(obj: bpy.types.Object | None) -> None:
+    """Let the panel show the newest bake of an object."""
+    if obj is not None:
+        settings_of(obj).chosen = ""
+
+
+def panel_keys(settings: ObjectSettings) -> tuple[str, ...]:
+    """The names of the keys that the panel shows, from the first to the last."""
+    obj = expect(bpy.types.Object, settings.id_data)
+    first, last = suggested_keys(obj, settings.from_key, settings.to_key)
+    return (first, *(inner.name for inner in settings.via), last)
 
 
 def key_names(choices: MapChoices) -> tuple[str, ...]:

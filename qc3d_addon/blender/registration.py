@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender is told about, in one ordered list."""
+"""Registration: all classes in the order in which Blender needs them, handlers and the command."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 
 from ..worker import engines
-from . import cli, compat, live_scrub, preferences, properties
+from . import choices, cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
@@ -27,15 +27,15 @@ from .operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, Q
 from .operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
-from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
+from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
 from .operators.split_key import QC3D_OT_split_key
-from .ui import menus, panel_combinations, panel_exports, panel_results, panels, presets
+from .ui import bake_list, menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
-    properties.InnerKey,  # before what has it
+    choices.InnerKey,  # before the settings that contain it
     properties.ObjectSettings,
     QC3D_OT_prepare,
     preferences.QC3DPreferences,
@@ -64,10 +64,12 @@ CLASSES = (
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
     QC3D_OT_add_inner_key,
+    QC3D_OT_go_through_sculpted,
     QC3D_OT_remove_inner_key,
-    presets.QC3D_MT_presets,
+    presets.QC3D_PT_presets,
     presets.QC3D_OT_add_preset,
     panels.QC3D_PT_inbetweens,
+    bake_list.QC3D_UL_bakes,
     panel_results.QC3D_PT_results,  # after its parent
     panel_combinations.QC3D_PT_combinations,
     panel_exports.QC3D_PT_exports,

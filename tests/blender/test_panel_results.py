@@ -24,6 +24,7 @@ class Layout:
     def __init__(self) -> None:
         self.texts: list[str] = []
         self.buttons: list[tuple[str, Button]] = []
+        self.lists: list[tuple[int, int]] = []
 
     def label(self, text: str, **options: object) -> None:
         self.texts.append(text)
@@ -39,6 +40,10 @@ class Layout:
     def panel(self, name: str, default_closed: bool) -> tuple[Layout, Layout]:
         assert default_closed
         return self, self
+
+    def template_list(self, kind: str, name: str, data: object, collection: str, *active: object, **rows: int) -> None:
+        assert hasattr(bpy.types, kind)
+        self.lists.append((len(getattr(data, collection)), rows["rows"]))
 
     def separator(self) -> None:
         pass
@@ -118,7 +123,7 @@ def test_a_bake(even: bpy.types.Object) -> None:
 def test_a_lost_key_is_said(even: bpy.types.Object) -> None:
     key = even.data.shape_keys.key_blocks["Lean.L"]
     key.name, key.points[0].co.x = "Other", 7.0  # another name alone would be followed
-    sentence = "Shape key 'Lean.L' was renamed or deleted; give it its name back to re-bake, or bake anew."
+    sentence = "Shape key 'Lean.L' was renamed or deleted; restore its name to re-bake, or make a new bake."
     assert sentence in drawn(even).texts
 
 
@@ -131,11 +136,47 @@ def test_a_mirror_image_is_made_again_from_the_other_side(even: bpy.types.Object
     assert bpy.ops.qc3d.mirror() == {"FINISHED"}
     layout = drawn(even)
     assert {f"Mirrored from {SLIDER}", "2 in-betweens"} < set(layout.texts)
-    first = layout.buttons[0]  # the newest is on top
+    first = layout.buttons[0]  # the newest is shown
     assert (first[0], first[1].slider) == ("mirror", SLIDER)  # type: ignore[attr-defined]
-    of_the_image = [name for name, button in layout.buttons if button.slider == "Basis_to_Lean.R"]  # type: ignore[attr-defined]
+    of_the_image = [name for name, button in layout.buttons[1:] if button.slider == "Basis_to_Lean.R"]  # type: ignore[attr-defined]
+    assert "remove" in of_the_image
     assert "mirror" not in of_the_image
     assert "rebake" not in of_the_image
+
+
+def test_several_bakes_are_a_list_with_the_details_of_the_chosen_one(even: bpy.types.Object) -> None:
+    assert drawn(even).lists == []
+    for count in range(4):
+        name = f"Lean {count}"
+        key = even.shape_key_add(name=name, from_mix=False)
+        for point in key.points:
+            point.co.y += 0.1 * (count + 1) * max(point.co.z, 0.0)
+        even.qc3d.chosen = SLIDER
+        assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key=name, mode="linear", count=1) == {"FINISHED"}
+        assert even.qc3d.row == 0  # the newest
+    layout = drawn(even)
+    assert layout.lists == [(len(even.data.shape_keys.key_blocks), 5)]
+    assert {button.slider for _, button in layout.buttons} == {"Lean 3"}  # type: ignore[attr-defined]
+    even.qc3d.row = 4
+    assert even.qc3d.chosen == SLIDER
+    assert {button.slider for _, button in drawn(even).buttons} == {SLIDER}  # type: ignore[attr-defined]
+    assert bpy.ops.qc3d.remove(slider="Lean 3") == {"FINISHED"}
+    assert even.qc3d.row == 3
+    assert bpy.ops.qc3d.remove(slider=SLIDER) == {"FINISHED"}
+    assert even.qc3d.row == 0
+    even.qc3d.row = 99
+    assert even.qc3d.row == 0
+
+
+def test_bakes_whose_keys_are_gone_can_be_removed(even: bpy.types.Object) -> None:
+    assert bpy.ops.qc3d.bake_inbetweens(
+        from_key="Basis", to_key="Lean.L", mode="straight", play_on="slider", count=1
+    ) == {"FINISHED"}
+    blocks = even.data.shape_keys.key_blocks
+    while len(blocks) > 1:
+        even.shape_key_remove(blocks[-1])
+    removed = [button.slider for name, button in drawn(even).buttons if name == "remove"]  # type: ignore[attr-defined]
+    assert sorted(removed) == [SLIDER, f"{SLIDER}_straight"]
 
 
 def test_a_damaged_record_is_said(even: bpy.types.Object) -> None:

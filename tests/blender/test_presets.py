@@ -34,15 +34,16 @@ def test_saved_and_taken_up_again(figure: bpy.types.Object, folder: Path) -> Non
     for name in chosen:
         figure.qc3d.property_unset(name)
     figure.qc3d.from_key = "Lean"
-    bpy.ops.script.execute_preset(filepath=str(path), menu_idname=presets.QC3D_MT_presets.__name__)
+    bpy.ops.script.execute_preset(filepath=str(path), menu_idname=presets.QC3D_PT_presets.__name__)
     assert {name: getattr(figure.qc3d, name) for name in chosen} == chosen
     assert figure.qc3d.from_key == "Lean"  # keys belong to one character
-    assert presets.QC3D_MT_presets.bl_label == "My faces"
+    assert presets.QC3D_PT_presets.bl_label == "My faces"
 
 
 def test_every_choice_but_the_keys_and_frames_is_saved(figure: bpy.types.Object) -> None:
     keys = {"from_key", "via", "to_key", "extra_turns"}
-    other = keys | {"use_keyframes", "frame_start", "frame_end", "measure", "colliders"}
+    keys |= {"first", "last"}
+    other = keys | {"use_keyframes", "frame_start", "frame_end", "measure", "colliders", "chosen", "row"}
     known = set(figure.qc3d.bl_rna.properties.keys()) - {"rna_type", "name"}
     assert set(presets.SETTINGS) == known - other
 
@@ -74,5 +75,5 @@ class TestPreferences:
 def test_cancel_has_nothing_to_cancel() -> None:
     assert jobs.current() is None
     assert not bpy.ops.qc3d.cancel.poll()
-    with pytest.raises(RuntimeError, match="Nothing is being baked"):
+    with pytest.raises(RuntimeError, match="No bake is running"):
         bpy.ops.qc3d.cancel()

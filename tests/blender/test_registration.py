@@ -48,3 +48,15 @@ def test_registering_does_not_load_the_solver(repository: Path) -> None:
 def test_the_package_can_be_imported_without_blender(repository: Path) -> None:
     script = f"import sys; sys.modules['bpy'] = None; sys.path.insert(0, {str(repository)!r}); import qc3d_addon"
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_menus_are_as_they_were() -> None:
+    def of_ours() -> list[str]:
+        found = (getattr(getattr(bpy.types, name), "draw", None) for name in dir(bpy.types))
+        calls = [call.__module__ for draw in found for call in getattr(draw, "_draw_funcs", ())]
+        return [module for module in calls if module.startswith("qc3d_addon")]
+
+    assert of_ours()
+    qc3d_addon.unregister()
+    assert of_ours() == []
+    qc3d_addon.register()

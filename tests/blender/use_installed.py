@@ -122,6 +122,8 @@ def _known() -> dict[str, list[str]]:
             f"{name}: {getattr(draw, '__module__', draw)}"
             for name in dir(bpy.types)
             for draw in getattr(getattr(getattr(bpy.types, name), "draw", None), "_draw_funcs", ())
+            # Blender lists its own function too, from the first time that anything is added to it.
+            if not draw.__module__.startswith("bl_ui.")
         ],
         "handlers": [f"{name}: {call.__module__}" for name in handlers for call in getattr(bpy.app.handlers, name)],
         "keymaps": [

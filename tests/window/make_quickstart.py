@@ -86,7 +86,7 @@ def open_file(window: Window, pictures: Path) -> None:
 
 def choose(window: Window, pictures: Path) -> None:
     """Step 3: the keys to start from and to end with, and keyframes."""
-    for setting, entry in (("qc3d.from_key", 0), ("qc3d.to_key", 3)):
+    for setting, entry in (("qc3d.first", 0), ("qc3d.last", 3)):
         x, y = window.find(setting)
         click(window, x, y)
         window.move(x, y + 33 + 20 * entry)

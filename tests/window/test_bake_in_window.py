@@ -62,7 +62,7 @@ def test_the_bar_grows_and_the_window_is_drawn_all_the_while(window: Window, tmp
 
 
 def test_the_button_cannot_be_pressed_before_the_keys_are_chosen(window: Window) -> None:
-    window.ask("arm().qc3d.to_key = ''; remember('No key')")
+    window.ask("arm().qc3d.to_key, arm().active_shape_key_index = '', 0; remember('No key')")
     window.push(BAKE)
     time.sleep(1.0)  # nothing is to happen, for which there is no sign
     assert window.ask("job()") is None
@@ -87,7 +87,7 @@ def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
         window.press("Escape")
     window.wait_gone(child)
     print(f"the child process was gone after {time.monotonic() - began:.2f} s")
-    window.wait_for("'Bake In-Betweens was cancelled; nothing was changed.' in reports()")
+    window.wait_for("'Bake In-Betweens was canceled; nothing was changed.' in reports()")
     assert window.ask("state()") == before
     assert window.ask("child()") is None
     assert list(window.folder.glob("qc3d-*")) == []

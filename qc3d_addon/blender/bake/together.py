@@ -58,7 +58,7 @@ def plan_together(objects: Sequence[bpy.types.Object], request: BakeRequest) -> 
     Raises
     ------
     InputError
-        If one cannot be baked, shares its mesh with another, or has no size along an axis.
+        If one cannot be baked, shares its mesh with another, or has the scale 0 along an axis.
     """
     from ...solver.frames.task import Task
     from ...solver.frames.together import PlacedMesh, Together
@@ -146,5 +146,5 @@ def _control(plan: Plan) -> Control:
 def _matrix(obj: bpy.types.Object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
-        raise InputError(f"'{obj.name}' has no size along an axis; give it a scale other than 0.")
+        raise InputError(f"'{obj.name}' has the scale 0 along an axis; set another scale.")
     return matrix

@@ -17,7 +17,7 @@ from ..chains.absolute_copy import copied
 from ..keys.control import key_path, value_path
 from ..kinds import keys_of, mesh_of, present
 
-# Two evaluations in a row that agree are right: Blender's threads seldom evaluate a driver before what it reads.
+# Two evaluations in a row that agree are right: see the values for glTF.
 _MOST_EVALUATIONS = 10
 # What stands between the names of keys in the name of a shape for all of them.
 _MARKS = ("_", "+", "-", " + ", "__", ".", " ", "_x_")

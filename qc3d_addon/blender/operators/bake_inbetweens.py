@@ -13,7 +13,9 @@ from bpy.props import BoolProperty
 from .. import live_scrub
 from ..bake.plan import Plan, plan_bake, request_again, write_bake
 from ..bake.together import objects_with_keys, plan_together, write_together
-from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..choices import BakeChoices
+from ..kinds import present
+from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
 from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
-    """Fill in the frames between two shape keys or more, as new shape keys that one slider plays"""
+    """Fill in the frames between two or more shape keys: new shape keys, all played by one slider or key"""
 
     bl_idname = "qc3d.bake_inbetweens"
     bl_label = "Bake In-Betweens"
@@ -40,11 +42,12 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         live_scrub.end()
         result = write_bake(plan, outcome)
+        show_newest(plan.locate())
         return [*result.notes, result.summary()]
 
 
 class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
-    """Bake in-betweens again after their keys were sculpted, with the same choices; slider and drivers stay"""
+    """Bake these in-betweens again with the same options, after their keys were sculpted; slider and drivers stay"""
 
     bl_idname = "qc3d.rebake"
     bl_label = "Re-Bake"
@@ -63,6 +66,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         live_scrub.end()
         result = write_bake(plan, outcome)
+        show_newest(plan.locate())
         return [*result.notes, result.summary()]
 
 
@@ -91,7 +95,7 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
         active = checks.require_object(context.active_object)
         fill_from_panel(self.properties, settings_of(active))
         request = bake_request(self)
-        others = [obj for obj in context.selected_objects if obj != active and obj.type == 'MESH']
+        others = [obj for obj in present(context.selected_objects) if obj != active and obj.type == 'MESH']
         chosen = objects_with_keys(active, others, request.keys)
         self._left_out = [obj.name for obj in others if obj not in chosen]
         self._joint = plan_together(chosen, request)
@@ -100,6 +104,7 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         live_scrub.end()
         results = write_together(self._joint, outcome, self.one_control)
+        show_newest(plan.locate())
         notes = list(dict.fromkeys(note for result in results for note in result.notes))
         if self._left_out:
             names = ", ".join(f"'{name}'" for name in self._left_out)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that bakes many keys of an object in one run, each on itself."""
+"""The operator that bakes many keys of an object in one run, each played by its own value."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -13,8 +13,9 @@ from ...solver.errors import QC3DError
 from .. import live_scrub
 from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
 from ..bake.plan import Plan
+from ..choices import BakeChoices
 from ..kinds import keys_of, present
-from ..properties import BakeChoices, bake_request, fill_from_panel, settings_of
+from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
 from .common import Status, poll_active_object
@@ -33,29 +34,29 @@ class KeyChoice(bpy.types.PropertyGroup):
 
 
 class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
-    """Bake in-betweens on many shape keys of the object in one run; keys that need none are left alone"""
+    """Bake in-betweens for many shape keys at once, each played by its own value; keys that need none are skipped"""
 
     bl_idname = "qc3d.bake_keys"
     bl_label = "Bake Keys"
 
     if TYPE_CHECKING:
         which: str
-        # In place of the names of an operator's own custom properties, which it has none of.
+        # Shadows bpy_struct.keys, the names of custom properties, of which an operator has none.
         keys: "bpy.types.bpy_prop_collection_idprop[KeyChoice]"  # type: ignore[assignment]
     else:
         which: EnumProperty(
             name="Keys",
             description="The keys to bake",
             items=[
-                ("all", "All", "Every key but the Basis and what was baked"),
-                ("selected", "Selected", "Those selected in the list of shape keys, from Blender 5 on; else asks"),
-                ("named", "Named", "Those with a tick among the operator's keys"),
+                ("all", "All", "All keys except the Basis and baked in-betweens"),
+                ("selected", "Selected", "Keys selected in the list; before Blender 5, keys that you tick in a dialog"),
+                ("named", "Named", "Keys that are ticked in the operator's own list"),
             ],
             default="all",
             options={'SKIP_SAVE'},
         )
         keys: CollectionProperty(
-            name="Keys", description="Keys to bake, as [{\"name\": key}, …]", type=KeyChoice, options={'SKIP_SAVE'}
+            name="Keys", description="Keys to bake, as [{\"name\": key}, ...]", type=KeyChoice, options={'SKIP_SAVE'}
         )
 
     @classmethod
@@ -104,6 +105,7 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
     def write_all(self, plan: Plan | None, outcome: Union["Outcome", QC3DError, None]) -> list[str]:
         live_scrub.end()
         verdicts = [one if isinstance(one, Verdict) else write_key(*one) for one in self._done]
+        show_newest(plan.locate() if plan is not None else None)
         return [*map(str, verdicts), summary(verdicts)]
 
     def _next(self, context: bpy.types.Context) -> Plan | None:

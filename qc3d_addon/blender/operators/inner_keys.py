@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import IntProperty
 
+from ..bake.suggested_keys import sculpted_between
 from ..kinds import present
 from ..properties import settings_of
 from .common import Status, poll_active_object
 
 
 class QC3D_OT_add_inner_key(bpy.types.Operator):
-    """Go through one more shape key on the way"""
+    """Add a shape key for the motion to go through"""
 
     bl_idname = "qc3d.add_inner_key"
     bl_label = "Add Key Between"
@@ -31,7 +32,7 @@ class QC3D_OT_add_inner_key(bpy.types.Operator):
 
 
 class QC3D_OT_remove_inner_key(bpy.types.Operator):
-    """Do not go through this shape key"""
+    """Remove this shape key from the motion"""
 
     bl_idname = "qc3d.remove_inner_key"
     bl_label = "Remove Key Between"
@@ -52,4 +53,29 @@ class QC3D_OT_remove_inner_key(bpy.types.Operator):
             self.report({'ERROR'}, f"There is no row {self.index}; there are {len(rows)}.")
             return {'CANCELLED'}
         rows.remove(self.index)
+        return {'FINISHED'}
+
+
+class QC3D_OT_go_through_sculpted(bpy.types.Operator):
+    """Go through the keys that are named as in-betweens of the last one, such as Smile_25, Smile_50 and Smile_75"""
+
+    bl_idname = "qc3d.go_through_sculpted"
+    bl_label = "Go Through Sculpted In-Betweens"
+    bl_options = {'UNDO', 'INTERNAL'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> Status:
+        obj = present(context.active_object)
+        settings = settings_of(obj)
+        names = sculpted_between(obj, settings.last)
+        if not names:
+            self.report({'ERROR'}, f"No keys are named as evenly spaced in-betweens of '{settings.last}'.")
+            return {'CANCELLED'}
+        settings.from_key, settings.to_key = settings.first, settings.last
+        settings.via.clear()
+        for name in names:
+            settings.via.add().name = name
         return {'FINISHED'}

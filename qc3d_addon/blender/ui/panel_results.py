@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sub-panel below the choices: each slider with what its bake made."""
+"""The sub-panel of the bakes: each control with the results of its bake."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ from ..properties import settings_of
 from ..store import checks, kept_measures, records
 from ..store.records import Chain, Record
 from ..store.summaries import Summary
+from . import bake_list
 from .panel_texts import draw_sentence
 from .panels import QC3D_PT_inbetweens
 
@@ -46,12 +47,12 @@ _MORE: tuple[tuple[type[bpy.types.Operator], IconItems], ...] = (
     (QC3D_OT_save_map, 'FILE_TICK'),
     (QC3D_OT_remove, 'TRASH'),
 )
-_STOPPED = "Blender stopped the drivers, since the slider had no value for a moment; re-bake to start them again."
+_STOPPED = "Blender stopped the drivers because the slider had no value (NaN) for a moment; re-bake to restart them."
 _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
 
 
 class QC3D_PT_results(bpy.types.Panel):
-    """The sliders of the active object's in-betweens, the newest first."""
+    """The list of the active object's bakes, the newest first, and the details of the chosen one."""
 
     bl_label = "Baked In-Betweens"
     bl_space_type = 'VIEW_3D'
@@ -70,27 +71,32 @@ class QC3D_PT_results(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         obj, layout = present(context.active_object), present(self.layout)
         try:
-            chains = Record.read(keys_of(obj)).chains
+            chains = Record.read(keys_of(obj)).chains[::-1]
         except InputError as error:
             draw_sentence(context, layout, str(error), 'ERROR')
             if records.state(keys_of(obj)).is_damaged:
                 layout.operator(QC3D_OT_forget_record.bl_idname, icon='TRASH')
             return
-        for chain in reversed(chains):
-            box = layout.box()
-            _draw_chain(context, box, obj, chain)
-            _draw_double_motion(context, box, obj, chain, chains)
+        if not chains:
+            return
+        chain = bake_list.draw(layout, obj, chains)
+        # Keys may have been deleted, so that there are fewer than bakes.
+        for left in chains[len(keys_of(obj).key_blocks) :]:
+            layout.operator(QC3D_OT_remove.bl_idname, text=f"Remove {left.slider}", icon='TRASH').slider = left.slider
+        box = layout.box()
+        _draw_chain(context, box, obj, chain, is_listed=len(chains) > 1)
+        _draw_double_motion(context, box, obj, chain, chains)
 
 
 def _draw_chain(
-    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain
+    context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, is_listed: bool
 ) -> None:
     control = chain_keys.control_of(obj, chain)
     control_problem = control.problem
-    if control_problem is None:
-        layout.prop(*control.shown, text=control.name, slider=True)
-    else:
+    if control_problem is not None:
         draw_sentence(context, layout, control_problem, 'ERROR')
+    elif not is_listed:  # else the list has it
+        layout.prop(*control.shown, text=control.name, slider=True)
     if chain_keys.are_drivers_stopped(keys_of(obj), chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(keys_of(obj), chain)
@@ -119,7 +125,7 @@ def _draw_chain(
 def _draw_double_motion(
     context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, chains: list[Chain]
 ) -> None:
-    """What adds to what the control shows, as it is now, and the button that ends it where there is one."""
+    """Warnings about motion that adds to what the control shows, and the button that ends it if there is one."""
     found = double_motion(obj, chain, chains)
     for sentence in found:
         draw_sentence(context, layout, sentence, 'ERROR')
@@ -148,14 +154,14 @@ def _draw_result(
         facts.label(text=f"Plays the motion within {result.played.distance:.2%} of the size")
         facts.label(text=f"Lengths hold within {result.played.stretch:.1%}{volume}")
     if result.residual is None:
-        facts.label(text="Straight blend, without a map")
+        facts.label(text="Straight lines, without a map")
     else:
         facts.label(text=f"Fitted within {result.residual:.2%} of the size")
         facts.label(text=f"Engine {result.engine}")
 
 
 def _count(result: Summary, name: str) -> int | None:
-    """The most of a kind of problem, in the in-betweens and in what is played between them."""
+    """Largest count of one kind of problem, at the in-betweens and between them; None if unknown."""
     counts = [getattr(result, name), getattr(result.played, name, None)]
     return max((count for count in counts if count is not None), default=None)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in the 3D view's sidebar: the choices, the button, and how far the work is."""
+"""The panel in the 3D view's sidebar: the options, the button, and the progress."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import bpy
 
 from ...worker import engines
 from ..bake import jobs, progress_bar
+from ..bake.suggested_keys import sculpted_between
 from ..kinds import keys_of, present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
 from ..operators.cancel import QC3D_OT_cancel
-from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_remove_inner_key
+from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
 from ..operators.map_files import QC3D_OT_load_map
 from ..operators.prepare import QC3D_OT_prepare
-from ..properties import ObjectSettings, key_names, settings_of
+from ..properties import ObjectSettings, panel_keys, settings_of
 from ..store import checks, records
-from . import presets
+from . import panel_rig, presets
 from .panel_texts import draw_sentence
 
-# Else Blender asks the operators whether they can run as if the mouse were over the 3D view, not over this panel.
+# Otherwise Blender calls the operators' poll as if the mouse were over the 3D view, not over this panel.
 IN_THE_SIDEBAR: Literal['INVOKE_DEFAULT'] = 'INVOKE_DEFAULT'
 
 
@@ -34,15 +35,24 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
     bl_region_type = 'UI'
     bl_category = "QC3D"
 
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        if checks.object_problem(context.active_object) is None:
+            presets.QC3D_PT_presets.draw_panel_header(present(self.layout))
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = present(self.layout)
         layout.use_property_split = True
         layout.use_property_decorate = False
         obj = context.active_object
+        if obj is not None and obj.type == 'ARMATURE':
+            panel_rig.draw(context, layout, obj)
+            if (job := jobs.current()) is not None:
+                _draw_job(layout, job)
+            return
         problem = checks.object_problem(obj)
         if obj is not None and problem is None:
             _draw_choices(layout, obj)
-            problem = checks.keys_problem(keys_of(obj), key_names(settings_of(obj)))
+            problem = checks.keys_problem(keys_of(obj), panel_keys(settings_of(obj)))
         job = jobs.current()
         if job is not None:
             _draw_job(layout, job)
@@ -56,7 +66,7 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             every.operator_context = IN_THE_SIDEBAR
             every.operator(QC3D_OT_bake_keys.bl_idname, text="Selected Keys").which = "selected"
             every.operator(QC3D_OT_bake_keys.bl_idname, text="All Keys").which = "all"
-            if len(context.selected_objects) > 1:
+            if len(present(context.selected_objects)) > 1:
                 together = layout.column()
                 together.operator_context = IN_THE_SIDEBAR
                 together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')
@@ -65,14 +75,13 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             return
         obj = present(obj)
         notice = engines.engine_notice() if settings_of(obj).engine != 'delaunay' else None
-        if notice is not None and not records.state(keys_of(obj)).chains:  # else it is said with what was baked
+        if notice is not None and not records.state(keys_of(obj)).chains:  # otherwise it stands with the results
             draw_sentence(context, layout, notice)
 
 
 def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     settings = settings_of(obj)
-    presets.draw(layout)
-    _draw_keys(layout, settings, keys_of(obj))
+    _draw_keys(layout, obj, settings)
     amount = layout.column(align=True)
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
     amount.prop(settings, "use_tolerance")
@@ -98,15 +107,21 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         row.operator(QC3D_OT_load_map.bl_idname)
 
 
-def _draw_keys(layout: bpy.types.UILayout, settings: ObjectSettings, keys: bpy.types.Key) -> None:
-    """A row for each key, in the order in which they are gone through."""
+def _draw_keys(layout: bpy.types.UILayout, obj: bpy.types.Object, settings: ObjectSettings) -> None:
+    """A row for each key, in the order of the motion."""
+    keys = keys_of(obj)
     column = layout.column()
-    column.prop_search(settings, "from_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    column.prop_search(settings, "first", keys, "key_blocks", icon='SHAPEKEY_DATA')
     for index, inner in enumerate(settings.via):
         row = column.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
         row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
-    column.prop_search(settings, "to_key", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    column.prop_search(settings, "last", keys, "key_blocks", icon='SHAPEKEY_DATA')
+    sculpted = [] if settings.via else sculpted_between(obj, settings.last)
+    if sculpted:
+        column.operator(
+            QC3D_OT_go_through_sculpted.bl_idname, text=f"Go Through {', '.join(sculpted)}", icon='SCULPTMODE_HLT'
+        )
     column.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
 
 

@@ -31,12 +31,14 @@ from .unfolding import unfolded_nearby
 
 MET = 1e-4  # of the diagonal: a vertex that is missed by no more is met
 _WEIGHTS = (1e5, 1e6, 1e7, 1e8)
-_ITERATIONS = (15, 15, 12, 6)  # with each weight, at most
+_ITERATIONS = (15, 15, 12, 6)  # with each weight, at most; of smaller meshes than this up to four times as many
+_MANY_TETS, _MOST_TIMES = 50_000, 4.0
 _REPAIR_ITERATIONS = 15
 # Landmarks that are missed by more than this part of the diagonal do not pull harder with it: what cannot be reached,
 # such as where a key crosses itself, would hold up all that can.
 _STRONGEST_AT = 1e-3
 _LEAST_WEIGHT = 0.05  # of the mean
+_WEIGHT_AT_CROSSINGS = 1e-2  # of others
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ def meet_keys(
     float
         The part that is done, 0..1.
     """
-    base = _lengthwise(embedding.weights)
+    base = _weights(embedding)
     coarse_landmarks = interpolation_matrix(coarse, embedding.key0)
     way = follow_path(FoldFreeFitter(coarse, coarse_landmarks, base), targets)
     followed = yield from told(way, lambda part: 0.1 * part)
@@ -94,10 +96,10 @@ def meet_keys(
         maps[step] = _carried(fitter, carry, followed.maps[step], maps[step - 1])
         yield 0.1 + 0.1 * step / len(maps)
     diagonal = embedding.pair.diagonal * embedding.scale
-    weights = base
+    weights, times = base, min(max(_MANY_TETS / len(mesh.tets), 1.0), _MOST_TIMES)
     for number, (weight, iterations) in enumerate(zip(_WEIGHTS, _ITERATIONS, strict=True)):
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
-        maps[-1] = fitter.fit(maps[-1], embedding.key1, iterations)
+        maps[-1] = fitter.fit(maps[-1], embedding.key1, round(times * iterations))
         missed = np.linalg.norm(fitter.residuals(maps[-1], embedding.key1), axis=1) / diagonal
         if missed.max() <= 0.5 * MET:
             break
@@ -133,8 +135,13 @@ def _carried(fitter: FoldFreeFitter, carry: csr_array, coarse: Floats, before: F
     return fitter.fit(before, fitter.landmarks @ values, _REPAIR_ITERATIONS) if found is None else found
 
 
-def _lengthwise(areas: Floats) -> Floats:
-    """(n,) weights by the lengths around vertices, the roots of areas: tetrahedra of all sizes resist alike then."""
-    lengths = np.sqrt(areas)
+def _weights(embedding: Embedding) -> Floats:
+    """(n,) weights of the vertices, with sum 1.
+
+    They are as the lengths around vertices, the roots of areas, so that tetrahedra of all sizes resist alike. Where a
+    key crosses itself they are small: what cannot be met must not hold up what is around it.
+    """
+    lengths = np.sqrt(embedding.weights)
     lengths = np.maximum(lengths, _LEAST_WEIGHT * lengths.mean())
-    return np.asarray(lengths / lengths.sum())
+    weights = np.where(crossing_vertices(embedding), _WEIGHT_AT_CROSSINGS, 1.0) * lengths
+    return np.asarray(weights / weights.sum())

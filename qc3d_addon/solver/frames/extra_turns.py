@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Full turns of whole parts, which two keys cannot tell: each part about its own axis through its middle."""
+"""Extra turns: full turns of whole parts, about their own axes, which two keys alone do not determine."""
 
 from __future__ import annotations
 

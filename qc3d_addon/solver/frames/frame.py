@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One in-between, and the certificate that its map has no folds."""
+"""Single frames, and the certificates of their maps."""
 
 from __future__ import annotations
 

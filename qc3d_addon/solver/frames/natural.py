@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mode ``natural``: the surface by its own rotations and stretches, carried by a map of the cube without folds."""
+"""Mode ``natural``: the surface follows its own interpolated rotations and stretches, guided by a fold-free map."""
 
 from __future__ import annotations
 
@@ -26,14 +26,13 @@ from .loose_pieces import LoosePieces
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
-# How often the surface is solved again around what colliders push.
-_PUSHES = 4
-# How many times as strongly the surface is drawn to the volume's anchors at a crossing.
+_PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
+# Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
 
 
 class NaturalFrames:
-    """In-betweens of a fitted pair; both keys are met, what both leave in place stays, no map has folds.
+    """In-betweens of a fitted pair: both keys are met exactly, still vertices stay, and no frame's map has folds.
 
     Parameters
     ----------
@@ -109,11 +108,11 @@ class NaturalFrames:
         return changed
 
     def shape(self, time: float) -> Floats:
-        """(n, 3) positions at ``time`` in 0..1, crossings not looked for."""
+        """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
         return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
-        """One frame for each of ``times`` (k,) in 0..1, clear of colliders; yields the part that is done."""
+        """One frame for each of ``times`` (k,) in 0..1, out of colliders; yields the finished share, 0..1."""
         volumes: list[Floats] = []
         positions: list[Floats] = []
         excess: list[int | None] = []
@@ -206,7 +205,7 @@ class NaturalFrames:
     def _cleared(
         self, resolver: CollisionResolver, times: Floats, volumes: list[Floats], positions: list[Floats]
     ) -> Generator[float, None, list[Floats]]:
-        """Push vertices out of the colliders and let the surface around give way, until none is too near."""
+        """Resolve collisions: push vertices out of colliders and solve the surface around them again, repeatedly."""
         embedding = self._fitted.embedding
         moments = times.tolist()
         reach = np.zeros(len(self.still))

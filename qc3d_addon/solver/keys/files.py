@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..files.npz import Archive, Header, open_archive
 from ..settings import Mirror, Quality
 from ..support.memory import estimated_mb, machine_limit_mb, require_memory
+from ..triangles.polygons import labels_by_sides
 from .keypair import Ends, KeyPair, consecutive_pairs
 
 
@@ -35,7 +36,7 @@ def read_pairs(
     path : Path
         An .npz file with ``faces`` (m, 3), ``shape_names`` (k,) and the shapes ``V0``, ``V1``, ... (n, 3) in the order
         of the names; and, if it has them, ``polygons``: for each triangle the number of its polygon (m,), or the
-        corners of polygons (p, c), short ones filled up with -1, in the order of their triangles. Other arrays are not
+        corners of the polygons (p, c), short ones filled up with -1. Other arrays are not
         looked at; pickled objects are refused.
     names : sequence of str
         Names of two or more shapes, no name twice in a row.
@@ -100,22 +101,22 @@ def read_pair(path: Path, first: str, second: str, quality: Quality = "normal") 
 
 
 def polygon_labels(polygons: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
-    """(m,) the polygon of each triangle (m, 3), from that or from the corners of all polygons (p, c).
+    """(m,) the polygon of each triangle (m, 3), from that or from the corners of all polygons (p, c), in any order.
 
     Raises
     ------
     InputError
-        If the triangles are not those of the polygons in their order.
+        If a triangle is part of none of the polygons.
     """
     if polygons.ndim != 2:
         return polygons
-    counts = (polygons >= 0).sum(axis=1) if polygons.dtype.kind in "iu" else np.zeros(len(polygons), dtype=np.int64)
-    labels = np.repeat(np.arange(len(polygons)), np.maximum(counts - 2, 0))
-    if faces.shape != (len(labels), 3) or not (faces[:, :, None] == polygons[labels][:, None, :]).any(axis=2).all():
-        raise InputError(
-            f"The triangles are not those of the {len(polygons)} polygons one after the other, each with two fewer "
-            "than it has corners; give the polygon of each triangle instead."
-        )
+    problem = "The polygons are not those that the triangles are parts of; give the polygon of each triangle instead."
+    if polygons.dtype.kind not in "iu" or faces.dtype.kind not in "iu" or faces.ndim != 2 or faces.shape[1] != 3:
+        raise InputError(problem)
+    labels = labels_by_sides(faces.astype(np.int64), polygons.astype(np.int64))
+    inside = (faces[:, :, None] == polygons[labels][:, None, :]).any(axis=2).all(axis=1)
+    if not (inside & (labels >= 0)).all():
+        raise InputError(problem)
     return labels
 
 

@@ -67,7 +67,7 @@ def size_around(points: Floats, share: float) -> SizeField:
     places = np.unique(points, axis=0)
     tree = cKDTree(places)
     distances, neighbours = tree.query(places, k=min(_NEAREST + 1, len(places)))
-    distances = np.reshape(distances, (len(places), -1))
+    distances = np.asarray(distances, dtype=np.float64).reshape(len(places), -1)
     if distances.shape[1] == 1:
         return normal.around(places)
     beside = distances[:, 1:]

@@ -17,6 +17,8 @@ from ..arrays import Floats, Ints
 # percentile. It is too small to be seen, and real pairs need up to 0.0015.
 _MOST_EXCESS = 0.002
 _PERCENTILE = 0.99
+# An edge that leaves the interval by more suffers in the straight blend.
+_SUFFERS = 0.01
 # Relative volume corrections below this never cost so much: even if everything must stretch, lengths change by a third.
 SMALL_CORRECTION = 0.005
 _SHORTEST = 1e-9  # cube units
@@ -41,27 +43,57 @@ class LengthsFirst:
         self._edges = edges[usable]
         self._shortest, self._longest = np.minimum(*ends)[usable], np.maximum(*ends)[usable]
         self._labels = labels
+        self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
         counts = np.bincount(self._label, minlength=int(labels.max(initial=-1)) + 1)
         # Position of each component's percentile among all edges, sorted by component and excess.
         self._has_edges = np.flatnonzero(counts)
         starts = np.cumsum(counts) - counts
         self._places = (starts + np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64))[self._has_edges]
+        # Of each component, how far the straight blend may be gone along: not at all where any edge suffers half-way.
+        worst = np.zeros(len(counts))
+        np.maximum.at(worst, self._label, self._excesses(0.5 * (key0 + key1)))
+        self._can_go_straight = np.clip((_SUFFERS - worst) / (_SUFFERS - _MOST_EXCESS), 0.0, 1.0)
+        self._can_go_straight[np.bincount(labels, weights=(key0 != key1).any(axis=1)) == 0] = 0.0
 
-    def mixed(self, held: Floats, free: Floats) -> Floats:
-        """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow."""
-        added = self._excess(held) - self._excess(free)
+    def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
+        """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
+
+        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse.
+        """
+        straight = (1.0 - time) * self._key0 + time * self._key1
+        added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
         part = _MOST_EXCESS / np.maximum(added, _MOST_EXCESS)
         return np.asarray(free + part[self._labels][:, None] * (held - free))
 
+    def straightened(self, shape: Floats, time: float) -> Floats:
+        """(n, 3) a shape whose components go straighter where that costs no lengths, and their own way does.
+
+        Where all edges of a component keep between their key lengths in the straight blend, as those of what is
+        flattened do, it is as good a way as any, and nothing may be worse than it.
+        """
+        if not self._can_go_straight.any():
+            return shape
+        straight = (1.0 - time) * self._key0 + time * self._key1
+        need = 1.0 - _MOST_EXCESS / np.maximum(self._excess(shape), _MOST_EXCESS)
+        part = need * self._can_go_straight
+        return np.asarray(shape + part[self._labels][:, None] * (straight - shape))
+
     def _excess(self, shape: Floats) -> Floats:
         """(components,) 99th percentile of how far edges leave the interval between their key lengths, relative."""
-        length = _lengths(shape, self._edges)
-        excess = np.maximum(np.maximum(length / self._longest, 2.0 - length / self._shortest) - 1.0, 0.0)
+        excess = self._excesses(shape)
         order = np.lexsort((excess, self._label))
         found = np.zeros(int(self._labels.max(initial=-1)) + 1)
         found[self._has_edges] = excess[order][self._places]
         return found
+
+
+    def _excesses(self, shape: Floats) -> Floats:
+        """(e,) how far each edge leaves the interval of its key lengths."""
+        length = _lengths(shape, self._edges)
+        return np.asarray(
+            np.maximum(np.maximum(length / self._longest, 2.0 - length / self._shortest) - 1.0, 0.0)
+        )
 
 
 def _lengths(shape: Floats, edges: Ints) -> Floats:

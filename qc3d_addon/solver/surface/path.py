@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface on its way from one key to the other: lengths, volumes and still vertices kept, both keys exact."""
+"""The surface path: shapes between two keys that keep lengths, volumes and still vertices, and meet both keys."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ _TRIANGLES_AT_ONCE = 150_000
 
 
 class SurfacePath:
-    """Shapes between the two keys of an embedded pair; everything that does not depend on the time is factored once.
+    """Shapes between the two keys of an embedded pair. Everything that does not depend on the time is factored once.
 
-    Positions minimise ``sum w |grad x - R_t P_t|^2 + a sum m |x - anchor_t|^2`` over triangles with weight w, rotation
-    R_t and stretch P_t, and vertices with area m; rotations are refitted to positions in sweeps. Edges that belong to
-    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys.
-    The enclosed volume of every closed component is that between its key volumes.
+    Positions x minimize ``sum w |grad x - R(t) P(t)|^2 + a sum m |x - anchor(t)|^2`` over triangles with weight w,
+    rotation R and stretch P, and vertices with area m; local/global sweeps refit the rotations. Edges that belong to no
+    usable triangle act as springs that keep their interpolated lengths. Still vertices move straight between the keys.
+    The enclosed volume of each closed component is interpolated linearly.
 
     Parameters
     ----------
@@ -57,20 +57,20 @@ class SurfacePath:
     law : StretchLaw
         How stretches are interpolated.
     free_after_turns : bool
-        Whether what comes back to its place after whole turns is not still, but turns with the rest of its component.
+        Whether vertices that return to their place after full turns move with their component instead of being still.
     other_way : (p,) int64, optional
         Components that turn the other way round, by a full turn less.
 
     Attributes
     ----------
     vertices : (k,) int64
-        One of each group of vertices that coincide in both keys; ``deformation`` counts in these.
+        One vertex of each group that coincides in both keys; ``deformation`` uses indices into these.
     still : (n,) bool
-        Vertices that stay on the straight line between the keys.
+        Whether each vertex is still, and so stays on the straight line between the keys.
     components : (n,) int64
-        Labels of the connected components.
+        Connected component of each vertex.
     turning : Turning
-        How the triangles of ``deformation`` turn.
+        Unwrapped rotations of the triangles of ``deformation``.
     whole_turn : (3,)
         Rotation vector of the motion of the whole, which is taken out of the keys; radians.
     half_turned : (p,) int64
@@ -135,7 +135,7 @@ class SurfacePath:
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
-        """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
+        """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
         np.maximum.at(strongest, self._group, factors)
@@ -143,12 +143,12 @@ class SurfacePath:
         return stronger
 
     def end_rates(self) -> tuple[Rates, Rates]:
-        """How fast triangles turn and stretch, and volumes grow, at the first and at the second key."""
+        """Rates of rotation, stretch and volume at the first and at the second key."""
         deformation = self.deformation
         spins = end_spins(self.turning.swing, self.turning.twist)
         slopes = stretch_slopes(deformation.stretch, self._law)
         growth = self._volumes[1] - self._volumes[0]
-        # Seen in the tangents of the second key.
+        # In the tangent bases of the second key.
         second = deformation.spins @ strain_of_slope(deformation.stretch, slopes[1])
         second = second @ deformation.spins.transpose(0, 2, 1)
         return Rates(spins[0], slopes[0], growth), Rates(spins[1], second, growth)
@@ -168,24 +168,25 @@ class SurfacePath:
 
     @property
     def shapes_at_once(self) -> int:
-        """For how many times it pays to solve together: a few where that spares calls and passes of the factors."""
+        """Number of shapes to solve together: several on small meshes, which saves calls and memory traffic."""
         return max(1, min(_MOST_AT_ONCE, _TRIANGLES_AT_ONCE // max(1, len(self._surface.rows))))
 
     def positions(self, time: float, anchor: Floats | None = None, sweeps: int = SWEEPS) -> Floats:
-        """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.
+        """(n, 3) positions in cube units at a time; the keys themselves at 0 and 1.
 
         Parameters
         ----------
         time : float
+            In 0..1.
         anchor : (n, 3), optional
-            What vertices are drawn to, the key at 0 and 1; without it each component is drawn along its screw.
+            Anchors of the vertices, equal to the keys at 0 and 1. By default each component follows its screw motion.
         sweeps : int
-            How often rotations are fitted to positions and positions to rotations.
+            Number of local/global iterations.
         """
         return self.shapes([(time, anchor)], sweeps)[0]
 
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
-        """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
+        """The ``positions`` for several (time, anchor), solved together, which is faster than one by one."""
         wanted = [self._wanted(*moment) for moment in moments]
         work = Sweeps(self._surface, wanted)
         settled = work.settled(sweeps)
@@ -193,11 +194,14 @@ class SurfacePath:
         if costly:
             free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
             for shape, other in zip(costly, free, strict=True):
-                settled[shape] = self._lengths_first.mixed(settled[shape], other)
+                settled[shape] = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
+        settled = [
+            self._lengths_first.straightened(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)
+        ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
-        """Positions (n, 3) of all vertices: copies are as far from the one of their group as in the keys."""
+        """(n, 3) positions of all vertices; coincident ones keep the tiny, interpolated offsets of their keys."""
         positions = self._rigid.placed(shape, time)[self._group]
         if self._apart is not None:
             positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
@@ -225,7 +229,7 @@ def _spans(positions: Floats, edges: Ints) -> Floats:
 
 
 def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
-    """(k, 2) edges that no usable triangle holds together: wires and edges of triangles without an area."""
+    """(k, 2) edges of no usable triangle: loose edges, and edges of triangles without an area."""
     every = unique_edges(np.concatenate([sides(faces), wires]))
     held = unique_edges(sides(usable))
     span = int(every.max(initial=0)) + 1

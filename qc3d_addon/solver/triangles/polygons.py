@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .geometry import face_normals
-from .topology import among, distinct
+from .topology import among, distinct, face_adjacency
 
 _FLAT = 1e-5  # sine of the largest angle between the triangles of a flat face: far above rounding in single precision
 _LONGER = 1e-6  # relative; squared lengths that differ by less are equal
@@ -100,6 +100,50 @@ def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
     order = np.lexsort((-left[inside], owner[inside]))
     counts = sides[sound]
     return point[inside][order], np.cumsum(counts) - counts, counts, ~sound[label]
+
+
+def labels_by_sides(faces: Ints, polygons: Ints) -> Ints:
+    """(m,) which of the polygons (p, c), short ones filled up with -1, each triangle is part of; -1 where of none.
+
+    Told by the sides that a triangle shares with its polygon; a triangle that has none is told by its neighbors.
+    """
+    counts = (polygons >= 0).sum(axis=1)
+    place = np.arange(polygons.shape[1])
+    following = np.where(place[None] + 1 < counts[:, None], np.roll(polygons, -1, axis=1), polygons[:, :1])
+    is_corner = place[None] < counts[:, None]
+    span = int(max(faces.max(initial=0), polygons.max(initial=0))) + 1
+    code = (polygons * span + following)[is_corner]
+    owner = np.nonzero(is_corner)[0]
+    order = np.argsort(code, kind="stable")
+    code, owner = code[order], owner[order]
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+    labels = np.full(len(faces), -1)
+    # The triangles may turn the other way round; a side then is one of the polygon beside it as well.
+    for first, second in ((0, 1), (1, 0)):
+        for side in range(3):
+            wanted = sides[:, side, first] * span + sides[:, side, second]
+            found = np.minimum(np.searchsorted(code, wanted), max(0, len(code) - 1))
+            told = np.flatnonzero((code[found] == wanted) & (labels < 0)) if len(code) else np.empty(0, dtype=np.int64)
+            told = told[_are_corners(faces[told], polygons[owner[found[told]]])]
+            labels[told] = owner[found[told]]
+    neighbors = face_adjacency(faces)
+    for _ in range(polygons.shape[1]):
+        one, other = labels[neighbors].T
+        new = (one < 0) != (other < 0)
+        if not new.any():
+            break
+        untold = np.where(one < 0, neighbors[:, 0], neighbors[:, 1])[new]
+        known = np.maximum(one, other)[new]
+        fits = _are_corners(faces[untold], polygons[known])
+        if not fits.any():
+            break
+        labels[untold[fits]] = known[fits]
+    return labels
+
+
+def _are_corners(triangles: Ints, polygons: Ints) -> Bools:
+    """(k,) whether all corners of a triangle (k, 3) are corners of a polygon (k, c)."""
+    return np.asarray((triangles[:, :, None] == polygons[:, None, :]).any(axis=2).all(axis=1))
 
 
 def flat_quads(keys: list[Floats], faces: Ints) -> Ints:

@@ -178,8 +178,8 @@ class TestWrongContents:
         ("version", "said"),
         [
             (FORMAT_VERSION, None),
-            (FORMAT_VERSION - 1, "was stored by an earlier version of QC3D"),
-            (FORMAT_VERSION + 1, "was stored by a later version of QC3D"),
+            (FORMAT_VERSION - 1, "was made by an earlier version of QC3D"),
+            (FORMAT_VERSION + 1, "was made by a later version of QC3D"),
             ("1", "is damaged"),
             (None, "is damaged"),
             ([1], "is damaged"),

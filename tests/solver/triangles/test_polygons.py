@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.triangles.geometry import areas
-from qc3d_addon.solver.triangles.polygons import covering, flat_quads
+from qc3d_addon.solver.triangles.polygons import covering, flat_quads, labels_by_sides
 
 from ..meshes import bent, box_surface, icosphere
 
@@ -110,3 +110,27 @@ class TestFlatQuads:
         faces = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 4]])
         assert np.array_equal(flat_quads([points], faces), np.arange(3))
         assert not len(flat_quads([points], np.empty((0, 3), dtype=np.int64)))
+
+
+class TestLabelsBySides:
+    @given(st.integers(0, 2**32 - 1))
+    def test_in_any_order(self, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        loops = [[0, 1, 2, 3], [3, 2, 4, 5, 6, 7, 8, 9], [9, 8, 10], [10, 8, 7, 11, 12]]
+        cut = [zigzag(np.array(loop)) if len(loop) > 5 else fan(np.array(loop), 1) for loop in loops]
+        triangles = np.concatenate(cut)
+        owner = np.repeat(np.arange(4), [len(loop) - 2 for loop in loops])
+        order = random.permutation(len(triangles))
+        polygons = np.array([loop + [-1] * (8 - len(loop)) for loop in loops])
+        turned = triangles[:, ::-1] if seed % 2 else triangles
+        assert np.array_equal(labels_by_sides(turned[order], polygons), owner[order])
+
+    def test_part_of_none(self) -> None:
+        polygons = np.array([[0, 1, 2, 3]])
+        assert labels_by_sides(np.array([[4, 5, 6], [0, 1, 2]]), polygons).tolist() == [-1, 0]
+        assert not len(labels_by_sides(np.empty((0, 3), dtype=np.int64), polygons))
+
+
+def zigzag(loop: Ints) -> Ints:
+    """Triangles of an octagon of which one has no side of it."""
+    return loop[np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6], [6, 7, 0], [0, 2, 4], [4, 6, 0]])]

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which keys are most likely meant where none are named. Quick enough for a panel."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+
+from ...solver.errors import InputError
+from ..kinds import shape_keys_of
+from ..store import combined_keys
+from ..store.records import Chain, Record
+
+# As riggers and other programs name sculpted in-betweens: the key's name and a percentage, with or without a separator.
+_PERCENTAGE = re.compile(r"[_. ]?(\d{1,2})")
+_ROUNDING = 0.01  # of places in whole percents, rounded or cut off
+
+
+def suggested_keys(obj: bpy.types.Object, first: str, last: str) -> tuple[str, str]:
+    """The first and the last key to go between, where an empty name is replaced by the most likely one.
+
+    The last key is the active one, or the one whose in-between is active; the first one is what the last is relative
+    to. A name stays empty where none is likely.
+    """
+    keys = shape_keys_of(obj) if obj.type == 'MESH' else None
+    if keys is None or not keys.use_relative or (first and last):
+        return first, last
+    if not last:
+        active = _active_key(obj, keys)
+        last = active if active != first else ""
+    if not first:
+        key = keys.key_blocks.get(last)
+        base = (keys.reference_key if key is None else key.relative_key).name
+        first = base if base != last else ""
+    return first, last
+
+
+def sculpted_between(obj: bpy.types.Object, last: str) -> list[str]:
+    """The user's own keys that are named as in-betweens of a key, such as "Smile_25", "Smile_50" and "Smile_75".
+
+    They are given in their order, and only where they stand evenly, as keys to go through do.
+    """
+    keys = shape_keys_of(obj) if obj.type == 'MESH' else None
+    if keys is None or not last:
+        return []
+    made = _made_keys(keys)
+    places = {}
+    for key in keys.key_blocks:
+        if key.name.startswith(last) and key.name not in made:
+            found = _PERCENTAGE.fullmatch(key.name[len(last) :])
+            if found is not None and int(found[1]) > 0:
+                places[int(found[1]) / 100.0] = key.name
+    evenly = [number / (len(places) + 1) for number in range(1, len(places) + 1)]
+    is_even = all(abs(place - even) <= _ROUNDING for place, even in zip(sorted(places), evenly, strict=True))
+    return [places[place] for place in sorted(places)] if is_even else []
+
+
+def _active_key(obj: bpy.types.Object, keys: bpy.types.Key) -> str:
+    """The active key, or the one that it is an in-between of; with two keys only, the second."""
+    key = obj.active_shape_key
+    if key is None or key == keys.reference_key:
+        own = [other.name for other in keys.key_blocks if other.name not in _made_keys(keys)]
+        return own[1] if len(own) == 2 else ""
+    made = _made_keys(keys)
+    chain = made.get(key.name)
+    if chain is not None:
+        return chain.through[-1] if chain.through[-1] in keys.key_blocks else ""
+    return "" if key.name in made else key.name
+
+
+def _made_keys(keys: bpy.types.Key) -> dict[str, Chain | None]:
+    """Names of the keys that were made, with the chain of those that are in-betweens."""
+    try:
+        made: dict[str, Chain | None] = dict.fromkeys(combined_keys.names_made(keys))
+        for chain in Record.read(keys).chains:
+            made.update(dict.fromkeys(chain.keys.values(), chain))
+    except InputError:  # the panel says what is wrong with the record
+        return {}
+    return made

@@ -34,7 +34,7 @@ SUFFIXES = (".usda", ".usdc", ".usd", ".fbx", ".glb")
 def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> list[str]:
     """Write an object with its shape keys and their in-betweens, and the animation over the scene's frames.
 
-    The object and the scene are unchanged afterwards, whatever happens. The parents of the object and the armatures
+    The object and the scene are unchanged afterward, whatever happens. The parents of the object and the armatures
     that deform it are exported too.
 
     Parameters

@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..keys import straight
 from ..keys.chain_keys import control_of
+from ..kinds import keys_of
+from ..operators.straight import QC3D_OT_straight
 from ..properties import newest_first
 from .panel_texts import draw_sentence
 
@@ -28,7 +31,12 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, rig: bpy.types.
         for chain in chains:
             control = control_of(obj, chain)
             if control.problem is None:
-                column.prop(*control.shown, text=control.name, slider=True)
+                row = column.row(align=True)
+                row.prop(*control.shown, text=control.name, slider=True)
+                row.context_pointer_set("active_object", obj)  # what the operator works on
+                is_straight = straight.is_on(keys_of(obj), chain)
+                button = row.operator(QC3D_OT_straight.bl_idname, text="", icon='IPO_LINEAR', depress=is_straight)
+                button.slider = chain.slider
             else:
                 draw_sentence(context, column, control.problem, 'ERROR')
     if not baked:

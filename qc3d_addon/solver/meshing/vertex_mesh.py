@@ -25,7 +25,7 @@ _NEAREST = 6  # vertices around each whose mean distance is the local length of 
 # Vertices that are much nearer than that lie on another sheet, across a gap that has to open.
 _GAP = 1.6
 _SLOPE = 0.6  # growth of the distance between samples away from the surface
-_APART = 0.6  # vertices nearer than this part of the local distance share a sample
+_APART = 0.6  # vertices nearer than this part of the local distance share a sample, with a share below 1
 # Samples lie beside the vertices, by this part of the local distance: the four corners of every quad would make a flat
 # tetrahedron otherwise.
 _BESIDE = 0.15
@@ -52,7 +52,9 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
     rng = np.random.default_rng(seed)
     size = size_around(points, share)
     vertices = rng.permutation(points[without_piles(points, 2)])
-    vertices = vertices[thin(vertices, _APART * size(vertices))]
+    # A coarse mesh has to find its way, for which it must not be finer than it looks.
+    apart = _APART if share < 1.0 else 1.0
+    vertices = vertices[thin(vertices, apart * size(vertices))]
     surface = np.concatenate([vertices, _between(vertices, points, faces, size, rng)])
     direction = rng.normal(size=surface.shape)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -28,8 +28,9 @@ class ChildWork(OperatorMixin):
     """Plan the work, run it in a child process, write the outcome.
 
     An operator defines ``plan`` and ``write``; one with several plans returns the next from ``following`` and writes
-    all outcomes in ``write_all``. Started from a button it is a modal operator, which Esc
-    cancels with the mouse over the progress; called by a script or without a window, it blocks until the end. Nothing is written unless all of the work was done.
+    all outcomes in ``write_all``. Started from a button it is a modal operator, which Esc cancels with the mouse over
+    the progress; called by a script or without a window, it blocks until the end. Nothing is written unless all of
+    the work was done.
     """
 
     bl_options = {'UNDO'}  # without REGISTER: its adjustment panel would run everything again at each change

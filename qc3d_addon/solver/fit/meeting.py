@@ -33,6 +33,7 @@ MET = 1e-4  # of the diagonal: a vertex is met if its distance is at most this
 _WEIGHTS = (1e5, 1e6, 1e7, 1e8)
 _ITERATIONS = (15, 15, 12, 6)  # largest number for each weight; up to four times as many for smaller meshes
 _MANY_TETS, _MOST_TIMES = 50_000, 4.0
+_MORE_ROUNDS, _FEW, _PROGRESS = 6, 0.005, 0.9
 _REPAIR_ITERATIONS = 15
 # Of the diagonal. Beyond this distance, the force of a landmark no longer grows. Otherwise landmarks that cannot be
 # met, as where a key crosses itself, would keep others from being met.
@@ -96,14 +97,22 @@ def meet_keys(
         yield 0.1 + 0.1 * step / len(maps)
     diagonal = embedding.pair.diagonal * embedding.scale
     weights, times = base, min(max(_MANY_TETS / len(mesh.tets), 1.0), _MOST_TIMES)
-    for number, (weight, iterations) in enumerate(zip(_WEIGHTS, _ITERATIONS, strict=True)):
+    reachable = ~crossing_vertices(embedding)
+    before = len(reachable)
+    schedule = [*zip(_WEIGHTS, _ITERATIONS, strict=True), *[(_WEIGHTS[-2], _ITERATIONS[0])] * _MORE_ROUNDS]
+    for number, (weight, iterations) in enumerate(schedule):
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
         maps[-1] = fitter.fit(maps[-1], embedding.key1, round(times * iterations))
         missed = np.linalg.norm(fitter.residuals(maps[-1], embedding.key1), axis=1) / diagonal
+        left = int(np.count_nonzero(missed[reachable] > MET))
         if missed.max() <= 0.5 * MET:
             break
+        # More rounds only where many are left, and as long as they help.
+        if number >= len(_WEIGHTS) - 1 and (left <= _FEW * len(missed) or left > _PROGRESS * before):
+            break
+        before = left
         weights = base * np.minimum(1.0, _STRONGEST_AT / np.maximum(missed, 1e-300))
-        yield 0.2 + 0.8 * (number + 1) / len(_WEIGHTS)
+        yield 0.2 + 0.8 * min(1.0, (number + 1) / len(_WEIGHTS))
     turned = rotation_vectors(polar_decomposition(mesh.jacobians(maps[-1])).rotation)
     turns = nearest_branch(turned, followed.turns[locate(coarse, mesh.centroids)[0]])
     return MetKeys(mesh, fitter.landmarks, maps, turns)

@@ -125,7 +125,7 @@ def _calm_part(embedding: Embedding) -> float:
     left = np.linalg.norm(embedding.key1 - embedding.key0, axis=1) / embedding.scale
     way = np.linalg.norm(embedding.pair.key1 - embedding.pair.key0, axis=1)
     squares = [float(embedding.weights @ distance**2) for distance in (left, way)]
-    share = min(np.sqrt(squares[0] / max(squares[1], 1e-300)) / _MOSTLY_RIGID, 1.0)
+    share = min(float(np.sqrt(squares[0] / max(squares[1], 1e-300))) / _MOSTLY_RIGID, 1.0)
     part = max(share - _EXACTLY_RIGID, 0.0) / (1.0 - _EXACTLY_RIGID)
     return part * part * (3.0 - 2.0 * part)
 

@@ -25,10 +25,10 @@ COARSE_SHARE, FINE_SHARE = 2.0, 0.7
 _NEAREST = 6  # nearest vertices whose mean distance defines the local edge length
 # Much nearer vertices belong to another sheet, across a gap that has to be resolved. Factor on their distance.
 _GAP = 1.6
-_SLOPE = 0.6  # growth of the spacing with the distance from the surface
-_APART = 0.6  # vertices nearer than this fraction of the local spacing share a sample
-# Offset of samples from the vertices, as a fraction of the local spacing. Without it, the four corners of a flat quad
-# would form a flat tetrahedron.
+_SLOPE = 0.6  # growth of the distance between samples away from the surface
+_APART = 0.6  # vertices nearer than this part of the local distance share a sample, with a share below 1
+# Samples lie beside the vertices, by this part of the local distance: the four corners of every quad would make a flat
+# tetrahedron otherwise.
 _BESIDE = 0.15
 _OVERSAMPLING = 4.0
 _WIDEST_CELL = 1.0
@@ -53,7 +53,9 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
     rng = np.random.default_rng(seed)
     size = size_around(points, share)
     vertices = rng.permutation(points[without_piles(points, 2)])
-    vertices = vertices[thin(vertices, _APART * size(vertices))]
+    # A coarse mesh has to find its way, for which it must not be finer than it looks.
+    apart = _APART if share < 1.0 else 1.0
+    vertices = vertices[thin(vertices, apart * size(vertices))]
     surface = np.concatenate([vertices, _between(vertices, points, faces, size, rng)])
     direction = rng.normal(size=surface.shape)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -27,26 +27,26 @@ _MOST_TURNS = 100
 
 @dataclass(frozen=True)
 class FitOptions:
-    """What the fit of two keys depends on; a fit made with other options must be made anew.
+    """Options of the fit between two keys; a fit with other options has to be computed again.
 
     Parameters
     ----------
     engine
-        What fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
+        Method that fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild if it works).
     quality
-        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``; or ``exact``, with which they are as fine as
-        the surface, and the map meets both keys. That one is always filled by ``delaunay``.
+        Resolution of the tetrahedra: ``normal``, ``fine``, ``finest``, or ``exact``. With ``exact`` they are as fine as
+        the surface, the map meets both keys, and the engine is always ``delaunay``.
     seed
         Seed of the random samples of the ``delaunay`` engine, 0 or more.
     stretch
         How mode ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
     extra_turns
-        Full turns, -100..100, that two shapes cannot tell: mode ``natural`` adds them to parts that turn freely, each
-        about its own axis. Where a part is pinned by still vertices, a non-zero value also frees vertices that return
-        to their place after full turns.
+        Full turns, in [-100, 100], that two shapes cannot determine: mode ``natural`` adds them to parts that can turn
+        freely, each about its own axis. If still vertices hold a part, a value other than 0 also frees those of them
+        that return to their place after full turns.
     sampling
-        What the ``delaunay`` engine triangulates: ``graded`` samples, or those of Chen & Lui (section 6.1),
-        ``published``: a uniform Poisson disk, of which samples are discarded at random.
+        Samples of the ``delaunay`` engine: ``graded``, or ``published``, those of Chen & Lui (section 6.1): a uniform
+        Poisson disk, of which samples are discarded at random.
     threshold
         Of the published sampling: within this many radii of the surface, fewer samples are kept the nearer they are.
     sparsity

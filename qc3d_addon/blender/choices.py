@@ -26,9 +26,9 @@ from .store.names import MAX_STEPS
 
 _DESCRIPTIONS = {
     "mode": {
-        "natural": "Rotations, lengths and volumes are kept",
-        "linear": "The stretch of the volume is interpolated linearly, as published",
-        "straight": "Straight lines, without a map: for keys that are mirrored or turned inside out",
+        "natural": "Limbs turn; lengths and volumes are kept",
+        "linear": "The published scheme, for comparison: only the stretch of the volume is interpolated",
+        "straight": "Vertices move on straight lines: for keys that are mirrored or turned inside out",
     },
     "stretch": {
         "linear": "Lengths grow by equal amounts",
@@ -41,18 +41,18 @@ _DESCRIPTIONS = {
         "ease-in-out": "Starts and ends slowly",
     },
     "engine": {
-        "auto": "TetWild where it can run, else Delaunay",
-        "tetwild": "Tetrahedral meshing in the wild; slower, and finer where the surface needs it",
-        "delaunay": "Delaunay tetrahedra of graded samples; quick, repeatable, runs everywhere",
+        "auto": "TetWild where it works, otherwise Delaunay",
+        "tetwild": "fTetWild; slower, and finer where the surface needs it",
+        "delaunay": "Delaunay tetrahedra of graded samples; fast, repeatable, works everywhere",
     },
     "weights": {
-        "smooth": "A smooth path through the in-betweens: a few of them play the whole motion",
-        "hats": "Straight blends from each in-between to the next",
+        "smooth": "A smooth path through the in-betweens, so that a few of them play the whole motion",
+        "hats": "Straight lines from each in-between to the next",
     },
     "quality": {
-        "normal": "All that in-betweens need",
-        "fine": "Four times as many tetrahedra: finer heat maps of volume and dilatation, mode Linear",
-        "finest": "As fine as it gets; slow",
+        "normal": "Enough for in-betweens",
+        "fine": "Twice as many tetrahedra: for heat maps of volume and dilatation, and for mode Linear",
+        "finest": "Four times as many tetrahedra; slow",
         "exact": "As fine as the mesh itself, so that the map meets both keys; slowest, for heat maps and mode Linear",
     },
 }
@@ -100,10 +100,11 @@ class MapChoices:
             options={'SKIP_SAVE'},
         )
         to_key: StringProperty(name="To", description="The shape key to end with", options={'SKIP_SAVE'})
-        stretch: _choice("stretch", "How the mode natural interpolates stretches")
+        stretch: _choice("stretch", "How mode Natural interpolates lengths")
         extra_turns: IntProperty(
             name="Extra Turns",
-            description="Full turns, between every two keys, that two shapes cannot tell",
+            description="Full turns to add between every two keys, for parts that spin more than half a turn; two "
+            "shapes alone cannot tell them",
             default=_DEFAULTS["extra_turns"],
             min=-100,
             max=100,
@@ -111,11 +112,11 @@ class MapChoices:
             soft_max=5,
             options={'SKIP_SAVE'},
         )
-        engine: _choice("engine", "What fills the volume around the mesh")
-        quality: _choice("quality", "How fine the volume is")
+        engine: _choice("engine", "Method that fills the volume around the mesh with tetrahedra")
+        quality: _choice("quality", "Resolution of the volume around the mesh")
         seed: IntProperty(
             name="Seed",
-            description="Of the samples that the volume is made from",
+            description="Seed of the random samples that the volume is made from",
             default=_DEFAULTS["seed"],
             min=0,
             options={'SKIP_SAVE'},
@@ -149,15 +150,15 @@ class BakeChoices(MapChoices):
         )
         use_tolerance: BoolProperty(
             name="As Few as Needed",
-            description="Make as few in-betweens as stay within a tolerance, where they help, "
+            description="Make only as many in-betweens as the tolerance asks for, where they help most, "
             "instead of a fixed number",
             default=False,
             options={'SKIP_SAVE'},
         )
         tolerance: FloatProperty(
             name="Tolerance",
-            description="How far a vertex may be from where it should be, at any position of the slider; "
-            "a length in the object's own units, before its scale",
+            description="Largest distance of a vertex from its exact place, at any position of the slider; "
+            "in the object's own units, before its scale",
             default=0.001,
             min=1e-6,
             soft_max=1.0,
@@ -167,34 +168,34 @@ class BakeChoices(MapChoices):
             unit='LENGTH',
             options={'SKIP_SAVE'},
         )
-        weights: _choice("weights", "What is played between the in-betweens")
+        weights: _choice("weights", "How in-betweens are blended while they are played")
         colliders: StringProperty(
-            name="Keep Off",
-            description="A collection with objects that the in-betweens must not touch, such as eyeballs under lids",
+            name="Colliders",
+            description="Collection of objects that the in-betweens must not enter, such as eyeballs under lids",
             options={'SKIP_SAVE'},
         )
         play_on: EnumProperty(
             name="Play On",
             description="What plays the in-betweens",
             items=[
-                ("auto", "Auto", "The last key's own value where it can be, else a slider"),
-                ("key", "Key", "The last key's own value: whatever controls it now plays the arc"),
-                ("slider", "Slider", "A slider of their own, a custom property of the object"),
+                ("auto", "Auto", "The last key's own value where possible, otherwise a slider"),
+                ("key", "Key", "The last key's own value, so that its present controls play the in-betweens"),
+                ("slider", "Slider", "A new slider: a custom property of the object"),
             ],
             default="auto",
             options={'SKIP_SAVE'},
         )
-        mode: _choice("mode", "How the map between the keys is interpolated")
+        mode: _choice("mode", "How the in-betweens are made")
         easing: _choice("easing", "How the speed from the first key to the last changes")
         use_keyframes: BoolProperty(
             name="Keyframes",
-            description="Animate the slider from the first key to the last",
+            description="Animate the key or slider that plays the in-betweens",
             default=False,
             options={'SKIP_SAVE'},
         )
         frame_start: IntProperty(
-            name="Start", description="Frame at which the slider is at the first key", default=1, options={'SKIP_SAVE'}
+            name="Start", description="Frame that shows the first key", default=1, options={'SKIP_SAVE'}
         )
         frame_end: IntProperty(
-            name="End", description="Frame at which the slider is at the last key", default=25, options={'SKIP_SAVE'}
+            name="End", description="Frame that shows the last key", default=25, options={'SKIP_SAVE'}
         )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every difference between the Blender versions that QC3D supports (4.2 LTS to 5.2 LTS)."""
+"""All differences between the Blender versions that QC3D supports (4.2 LTS to 5.2 LTS)."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ Handler = TypeVar("Handler", bound=Callable[..., object])
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt: without its window Blender keeps it for itself, and a second one kills it."""
+    """Let Ctrl-C raise KeyboardInterrupt: in background mode Blender handles it itself, and a second one kills it."""
     before = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        # None where the handler is Blender's own, which Python cannot put back; then the next Ctrl-C ends Blender.
+        # None if the handler was Blender's own, which Python cannot restore; then the next Ctrl-C ends Blender.
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 def register_command(name: str, handler: Callable[[list[str]], int]) -> list[object]:
-    """Register ``blender --command NAME``; the handles to take it back, none where Blender has no commands."""
+    """Register ``blender --command NAME``; returns the handles to unregister it, none if Blender has no commands."""
     register = getattr(bpy.utils, "register_cli_command", None)
     return [] if register is None else [register(name, handler)]
 
 
 def unregister_command(handle: object) -> None:
-    """Take back what ``register_command`` returned."""
+    """Unregister a command by its handle from ``register_command``."""
     bpy.utils.unregister_cli_command(handle)
 
 
 def persistent(handler: Handler) -> Handler:
-    """Let a handler stay when another file is loaded."""
+    """Keep a handler when another file is loaded."""
     keep: Callable[[Handler], Handler] = bpy.app.handlers.persistent
     return keep(handler)
 
 
 def remove_handler(handlers: list[Handler], handler: Handler) -> None:
-    """Take a handler back, where it is still there: some scripts and add-ons remove those of others with their own."""
+    """Remove a handler if it is still there: some scripts and add-ons remove those of others too."""
     if handler in handlers:
         handlers.remove(handler)
 
@@ -59,7 +59,7 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
     """Add a driver whose value reaches the property unchanged.
 
     A new driver comes with a generator modifier (up to 4.5) or with two Bézier keyframes from (0, 0) to (1, 1) (5.x);
-    the Bézier curve turns 0.5 into 0.49999994. Without either the value passes through as it is.
+    that curve turns 0.5 into 0.49999994. Without either, the value is passed on exactly.
     """
     curve = expect(bpy.types.FCurve, owner.driver_add(data_path))
     while curve.modifiers:
@@ -72,7 +72,7 @@ def new_driver(owner: bpy.types.ID, data_path: str) -> bpy.types.FCurve:
 def clear_shape_keys(obj: bpy.types.Object) -> None:
     """Remove all shape keys of an object's mesh.
 
-    Up to 4.5 Blender leaves their data block behind, without a mesh: who then reads a point of it crashes.
+    Up to 4.5, Blender leaves their data block behind without a mesh, and reading a point of it crashes.
     """
     number = keys_of(obj).session_uid
     obj.shape_key_clear()
@@ -86,7 +86,7 @@ def find_fcurve(owner: Animated, data_path: str) -> bpy.types.FCurve | None:
 
 
 def is_animated(owner: Animated, data_path: str) -> bool:
-    """Whether a property of ``owner`` has keyframes: in its active action, or in a strip of the NLA that is on."""
+    """Whether a property of ``owner`` has keyframes in its active action or in an unmuted NLA strip."""
     if owner.animation_data is None:
         return False
     curve = find_fcurve(owner, data_path)
@@ -101,12 +101,12 @@ def is_animated(owner: Animated, data_path: str) -> bool:
 
 
 def _strip_fcurves(strip: bpy.types.NlaStrip) -> Curves | None:
-    """The F-curves that a strip of the NLA plays."""
+    """The F-curves that an NLA strip plays."""
     return None if strip.action is None else _curves_of(strip.action, strip)
 
 
 def remove_fcurve(owner: Animated, data_path: str) -> None:
-    """Remove the F-curve of a property, and the action with it where it holds nothing else and nobody else uses it."""
+    """Remove the F-curve of a property, and the action too if it becomes empty and has no other user."""
     animation = _animation(owner)
     action = present(animation.action)
     curves = _without(owner, data_path)
@@ -120,7 +120,7 @@ def _animation(owner: Animated) -> bpy.types.AnimData:
 
 
 def _without(owner: Animated, data_path: str) -> Curves:
-    """Remove the F-curve of a property; those that are left."""
+    """Remove the F-curve of a property; returns the remaining ones."""
     curves, curve = _fcurves(owner), find_fcurve(owner, data_path)
     assert curves is not None
     assert curve is not None
@@ -149,15 +149,15 @@ def _curves_of(action: bpy.types.Action, player: bpy.types.AnimData | bpy.types.
 
 
 def _curves_of_old(action: bpy.types.Action) -> Curves:
-    """The F-curves that an action before 4.4 holds itself."""
+    """The F-curves of an action before Blender 4.4, which had no slots."""
     curves: Curves = getattr(action, "fcurves")  # noqa: B009 - 5.x does not know it
     return curves
 
 
 def ensure_fcurve(owner: Animated, data_path: str, undo: ExitStack) -> bpy.types.FCurve:
-    """The F-curve of a property, with the action (and slot) made where there is none.
+    """The F-curve of a property; creates it, the action and the slot if needed.
 
-    Closing ``undo`` takes back what was made.
+    Closing ``undo`` removes what was created.
     """
     curve = find_fcurve(owner, data_path)
     if curve is not None:

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live scrub: while it is on, the slider shows every moment of the motion and not only the baked ones.
+"""Live scrub: while it is on, the slider shows the exact motion at every position, not only at the baked ones.
 
-A shape key follows the slider. It adds to what the baked keys show, so it is on beside all other keys, and neither the
-active key nor the display changes. It is no part of the file: it goes away before the file is saved and comes back
-after. Its name is reserved: a key of that name is taken away wherever it turns up, by undo or in a recovered file.
+A temporary shape key follows the slider and adds the difference to what the baked keys show, so that all other keys,
+the active key and the display stay as they are. It is not part of the file: it is removed before the file is saved and
+comes back afterward. Its name is reserved: a key of that name is removed wherever undo or a recovered file brings it
+back.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ KEY = "QC3D Preview"
 
 @dataclass
 class _Scrub:
-    """The preview that is on."""
+    """The preview that is shown."""
 
-    plan: Plan  # finds the object, and knows the keys that the curve was made from
+    plan: Plan  # finds the object again and has the keys that the curve was made from
     chain: Chain
     weights: Weights
     curve: PreviewCurve
-    place: float | None = None  # where the slider was when the key was last set
+    place: float | None = None  # value of the slider when the key was last set
     was_edited: bool = False
 
 
@@ -48,19 +49,19 @@ _suspended: _Scrub | None = None  # while the file is saved
 
 
 def is_on(obj: bpy.types.Object | None, slider_name: str = "") -> bool:
-    """Whether the preview is on for an object, and for that slider where one is named."""
+    """Whether the preview is on for an object, and for the slider if one is named."""
     if _scrub is None or obj is None or _scrub.plan.object_id != obj.session_uid:
         return False
     return not slider_name or _scrub.chain.slider == slider_name
 
 
 def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
-    """Show the curve where the slider of a baked chain is, and follow the slider from now on.
+    """Show the motion at the slider of a baked chain and follow the slider from now on.
 
     Raises
     ------
     InputError
-        If the object of the plan is gone or was changed meanwhile, or the slider is not a number; it is as it was.
+        If the object of the plan was deleted or changed, or the slider is not a number; nothing is changed then.
     """
     obj = plan.find_object()
     chain_keys.control_of(obj, chain).require()
@@ -70,7 +71,7 @@ def begin(plan: Plan, chain: Chain, curve: PreviewCurve) -> None:
 
 
 def end() -> None:
-    """Take the preview away, also one that undo or a recovered file brought back; else nothing happens."""
+    """Remove the preview, if there is one, also one that undo or a recovered file brought back."""
     global _scrub
     _scrub = None
     for keys in list(bpy.data.shape_keys):
@@ -80,11 +81,11 @@ def end() -> None:
 
 
 def _show_again(scrub: _Scrub) -> None:
-    """Show it where the object is there, is not being edited, and has the keys that the curve was made from."""
+    """Show it if the object exists, is not being edited, and has the keys that the curve was made from."""
     with contextlib.suppress(InputError):
         obj = scrub.plan.find_object()
         chain = Record.read(keys_of(obj)).chain_of_slider(scrub.chain.slider)
-        if chain is not None:  # undo may have brought back another number of steps
+        if chain is not None:  # undo may have restored a different number of steps
             _show(obj, replace(scrub, chain=chain, weights=chain.weights))
 
 
@@ -103,7 +104,7 @@ def _show(obj: bpy.types.Object, scrub: _Scrub) -> None:
 
 
 def _follow(scrub: _Scrub) -> None:
-    """Set the key to where the slider is, or end where the object is gone, was edited, or has lost key or slider."""
+    """Update the key to the slider, or end the preview if the object was deleted or edited, or lost key or slider."""
     obj = scrub.plan.locate()
     keys = None if obj is None or obj.type != 'MESH' else shape_keys_of(obj)
     key = None if keys is None else keys.key_blocks.get(KEY)
@@ -111,7 +112,7 @@ def _follow(scrub: _Scrub) -> None:
         end()
         return
     if mesh_of(obj).is_editmode:
-        scrub.was_edited = True  # the mesh cannot lose a key while a tool may be at work on it
+        scrub.was_edited = True  # the key is removed only after Edit Mode, while no tool works on the mesh
         return
     control = chain_keys.control_of(obj, scrub.chain)
     is_whole = len(mesh_of(obj).vertices) == len(key.points) == scrub.curve.vertices
@@ -138,8 +139,8 @@ def _block(mesh: bpy.types.Mesh) -> bpy.types.ShapeKey | None:
 
 def _remove_key(mesh: bpy.types.Mesh) -> None:
     found = next((obj for obj in bpy.data.objects if obj.data == mesh), None)
-    obj = bpy.data.objects.new(KEY, mesh) if found is None else found  # only an object can remove a key
-    if mesh.is_editmode:  # leaving Edit Mode would make the key again from its layer
+    obj = bpy.data.objects.new(KEY, mesh) if found is None else found  # Blender removes keys through an object
+    if mesh.is_editmode:  # leaving Edit Mode would create the key again from its layer
         layers = bmesh.from_edit_mesh(mesh).verts.layers.shape
         layer = layers.get(KEY)
         if layer is not None:
@@ -159,7 +160,7 @@ def _on_update(*_: object) -> None:
 
 @compat.persistent
 def _after_undo(*_: object) -> None:
-    """What was undone may have been made with or without the preview: it stays on while the keys are the same."""
+    """Keep the preview after undo or redo as long as the keys are the same."""
     scrub = _scrub
     end()
     if scrub is not None:
@@ -219,13 +220,13 @@ _HANDLERS = {
 
 
 def register() -> None:
-    """Follow what happens in the file."""
+    """Add the handlers."""
     for name, handler in _HANDLERS.items():
         getattr(bpy.app.handlers, name).append(handler)
 
 
 def unregister() -> None:
-    """Take the preview away and follow nothing."""
+    """Remove the handlers and the preview."""
     for name, handler in _HANDLERS.items():
         compat.remove_handler(getattr(bpy.app.handlers, name), handler)
     end()

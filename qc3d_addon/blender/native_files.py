@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that Blender itself reads and writes: names that it can hold, and what it says where it fails."""
+"""Files that Blender itself reads and writes: the limit on their names, its error messages, incomplete files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from ..solver.errors import InputError
 
-_LONGEST_PATH = 1023  # bytes; what Blender is given beyond that it cuts off, without a word
+_LONGEST_PATH = 1023  # bytes; Blender silently cuts off the rest
 
 # The start of a compressed .blend, and what its table of compressed pieces ends with (Zstandard's seekable format).
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
@@ -22,13 +22,13 @@ _BLOCK, _LARGE_BLOCK = struct.Struct("<4sIQII"), struct.Struct("<4sIQQQ")
 
 
 def require_short(path: Path, shown: Path) -> None:
-    """Refuse a name that Blender would cut off, and so write or read another file; the error calls it ``shown``."""
+    """Raise InputError for a name that Blender would cut off; the message calls the file ``shown``."""
     if len(os.fsencode(path)) > _LONGEST_PATH:
-        raise InputError(f"{shown} is too long a name for Blender; choose a folder with a shorter one.")
+        raise InputError(f"The name {shown} is too long for Blender; choose a folder with a shorter one.")
 
 
 def words(error: RuntimeError, new: Path, shown: Path) -> str:
-    """What an operator of Blender said as a clause; the file that it calls ``new`` is called ``shown``."""
+    """Message of one of Blender's operators as a clause, with the file ``new`` called ``shown``."""
     text = str(error).removeprefix("Error: ").replace(str(new), str(shown))
     return " ".join(text.split()).rstrip(".")
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences: what a bake may use of the machine."""
+"""The add-on's preferences: limits of time and memory for a bake."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -19,7 +19,7 @@ _MINUTES = 60
 
 
 class QC3DPreferences(bpy.types.AddonPreferences):
-    """Limits of the process that does the work."""
+    """Limits of the background process that computes a bake."""
 
     bl_idname = _PACKAGE
 
@@ -36,8 +36,8 @@ class QC3DPreferences(bpy.types.AddonPreferences):
         )
         memory_limit: IntProperty(
             name="Memory Limit",
-            description="Megabytes that a bake may hold; 0 for three quarters of the machine's memory. What needs more "
-            "is not started, and on Linux stopped",
+            description="Megabytes of memory that a bake may use; 0 for three quarters of the machine's memory. A bake "
+            "that would need more is not started; on Linux, one that uses more is stopped",
             default=0,
             min=0,
             max=10_000_000,
@@ -51,7 +51,7 @@ class QC3DPreferences(bpy.types.AddonPreferences):
 
 
 def limits(context: bpy.types.Context) -> "Limits":
-    """What the child process may use."""
+    """The limits of the child process, in seconds and megabytes."""
     from ..solver.support.memory import machine_limit_mb
     from ..worker.client import Limits
 

@@ -24,7 +24,7 @@ from .store.records import Chain, Record
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:
-    """Let a heat map that is on show the measure that was chosen; where it cannot, its button says why."""
+    """Switch a heat map that is shown to the chosen measure; if that is impossible, its button says why."""
     obj = expect(bpy.types.Object, settings.id_data)
     state = heat_map.shown(obj)
     if state is None or state.measure == settings.measure or checks.object_problem(obj) is not None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender is told about, in one ordered list."""
+"""Registration: all classes in the order in which Blender needs them, handlers and the command."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from .operators.straight import QC3D_OT_straight
 from .ui import bake_list, menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
-    choices.InnerKey,  # before what has it
+    choices.InnerKey,  # before the settings that contain it
     properties.ObjectSettings,
     QC3D_OT_prepare,
     preferences.QC3DPreferences,

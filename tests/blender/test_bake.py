@@ -282,7 +282,7 @@ class TestSlider:
 
         figure.data.shape_keys.key_blocks["Lean"].value = 0.5
         result = bake_object(figure, BakeRequest(("Basis", "Lean"), 1, play_on="slider"))
-        assert any("'Lean' is on by itself (0.50)" in note for note in result.notes)
+        assert any("'Lean' has the value 0.50" in note for note in result.notes)
 
 
 @pytest.mark.usefixtures("quick_map")

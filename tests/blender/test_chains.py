@@ -233,7 +233,8 @@ class TestToKeyframes:
         curve.keyframe_points.insert(7, 0.25)
         assert bpy.ops.qc3d.to_keyframes(frame_start=1, frame_end=3) == {"FINISHED"}
         assert [point.co.x for point in curve.keyframe_points] == [1.0, 3.0]
-        assert f"Keyframes that '{SLIDER}_50' had under its driver were replaced" in "".join(capfd.readouterr())
+        said = "".join(capfd.readouterr())
+        assert f"Keyframes of '{SLIDER}_50', which its driver had overridden, were replaced" in said
 
     def test_a_deleted_slider(self, figure: bpy.types.Object) -> None:
         bake()
@@ -359,7 +360,7 @@ class TestMirror:
         before = state()
         with pytest.raises(RuntimeError, match="is the mirror image of 'Basis_to_Lean'; mirror that one again"):
             getattr(bpy.ops.qc3d, name)(**({"filepath": "/none/none"} if name == "save_map" else {}))
-        with pytest.raises(RuntimeError, match="is the mirror image of 'Basis_to_Lean' itself; choose that one"):
+        with pytest.raises(RuntimeError, match="is itself the mirror image of 'Basis_to_Lean'; choose that one"):
             bpy.ops.qc3d.mirror()
         assert state() == before
 
@@ -371,7 +372,7 @@ class TestMirror:
         bake("Lean.L", count=1)
         bake("Lean.R", count=1)
         before = state()
-        with pytest.raises(RuntimeError, match=r"'Basis_to_Lean\.R' was baked from keys of its own; remove it before"):
+        with pytest.raises(RuntimeError, match=r"'Basis_to_Lean\.R' was baked from its own keys; remove it before"):
             bpy.ops.qc3d.mirror(slider="Basis_to_Lean.L")
         assert state() == before
         bpy.ops.qc3d.remove(slider="Basis_to_Lean.R")

@@ -134,7 +134,7 @@ class TestBake:
 class TestMeanwhile:
     """What happens to the objects between the beginning of a bake and its end."""
 
-    SENTENCE = "The objects of 'Off' were changed meanwhile; re-bake to keep off where they are now."
+    SENTENCE = "The colliders in 'Off' were changed during the bake; re-bake to use their present places."
 
     def notes(self, figure: bpy.types.Object, change: Callable[[], object]) -> tuple[str, ...]:
         plan = plans.plan_bake(figure, BakeRequest(THROUGH, 1, colliders="Off", play_on="slider"))

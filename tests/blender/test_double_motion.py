@@ -35,7 +35,7 @@ def said(obj: bpy.types.Object) -> list[str]:
 
 def switch_on(obj: bpy.types.Object) -> str:
     obj.data.shape_keys.key_blocks["Lean"].value = 0.5
-    return "Key 'Lean' is on by itself (0.50)"
+    return "Key 'Lean' has the value 0.50"
 
 
 def drive(obj: bpy.types.Object) -> str:
@@ -114,4 +114,4 @@ def test_in_betweens_that_no_record_knows(figure: bpy.types.Object) -> None:
     assert bpy.ops.qc3d.forget_record() == {"FINISHED"}
     bpy.ops.qc3d.bake_inbetweens(**choices)
     (chain,) = Record.read(figure.data.shape_keys).chains
-    assert "Key 'Lean_50' plays on 'Lean' too, from a bake that is not known any more; delete it." in chain.result.notes
+    assert "Key 'Lean_50', of an earlier bake without a record, also follows 'Lean'; delete it." in chain.result.notes

@@ -51,13 +51,13 @@ def no_mesh(figure: bpy.types.Object, folder: Path) -> str:
 
 def no_keys(figure: bpy.types.Object, folder: Path) -> str:
     figure.shape_key_clear()
-    return "'Figure' has fewer than two shape keys; add a second one to go to."
+    return "'Figure' has fewer than two shape keys; add a second one."
 
 
 def one_key(figure: bpy.types.Object, folder: Path) -> str:
     figure.shape_key_clear()
     figure.shape_key_add(name="Basis")
-    return "'Figure' has fewer than two shape keys; add a second one to go to."
+    return "'Figure' has fewer than two shape keys; add a second one."
 
 
 def edit_mode(figure: bpy.types.Object, folder: Path) -> str:
@@ -81,7 +81,7 @@ def sculpted_through_another_object(figure: bpy.types.Object, folder: Path) -> s
 
 def absolute_keys(figure: bpy.types.Object, folder: Path) -> str:
     figure.data.shape_keys.use_relative = False
-    return "The shape keys of 'Figure' are absolute; switch on Relative, which the slider needs."
+    return "The shape keys of 'Figure' are absolute; enable Relative, which in-betweens need."
 
 
 def linked_object(figure: bpy.types.Object, folder: Path) -> str:

@@ -269,7 +269,7 @@ def test_a_file_of_another_mesh_changes_nothing(
     with pytest.raises(RuntimeError, match="no mesh of 8 vertices"):
         bpy.ops.qc3d.read_usd(filepath=str(path))
     path.write_text("#usda 1.0\n(")
-    with pytest.raises(RuntimeError, match="no USD file"):
+    with pytest.raises(RuntimeError, match="cannot be read as a USD file"):
         bpy.ops.qc3d.read_usd(filepath=str(path))
     bpy.data.objects.remove(cube)
     bpy.context.view_layer.objects.active = played
@@ -279,7 +279,7 @@ def test_a_file_of_another_mesh_changes_nothing(
 
 @pytest.mark.parametrize("name", ["figure.obj", "figure"])
 def test_other_endings_are_refused(name: str, played: bpy.types.Object, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="ends in none of"):
+    with pytest.raises(InputError, match="has none of the extensions"):
         export(played, tmp_path / name)
     assert not list(tmp_path.iterdir())
 

@@ -124,7 +124,7 @@ class TestSculpted:
         outcome = finish(carry_out(plan.task))
         sculpt(figure, name)
         before = state()
-        with pytest.raises(InputError, match=f"'{name}' was sculpted or locked meanwhile; bake again to keep it"):
+        with pytest.raises(InputError, match=f"'{name}' was sculpted or locked during the bake; bake again to keep it"):
             write_bake(plan, outcome)
         assert state() == before
 
@@ -148,7 +148,7 @@ def test_keyframes_that_were_added_or_moved_stay(figure: bpy.types.Object) -> No
     curve.keyframe_points.insert(5, 0.9)
     bake(use_keyframes=True, frame_start=5, frame_end=50)
     assert [point.co.x for point in curve.keyframe_points] == [1.0, 5.0, 11.0]
-    assert "The keyframes of the key 'Lean' were edited, and left as they are." in notes(figure)
+    assert "The keyframes of the key 'Lean' were edited and were left as they are." in notes(figure)
 
 
 def test_two_modes_stand_beside_each_other(figure: bpy.types.Object, shapes: ReadShapes) -> None:

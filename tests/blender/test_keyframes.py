@@ -77,7 +77,7 @@ def test_the_animators_own_keyframes_stay(figure: bpy.types.Object) -> None:
     request = BakeRequest(("Basis", "Lean"), 1, frame_options=linear, keyframes=(1, 11), play_on="slider")
     result = bake_object(figure, request)
     assert keyframes(figure) == [(7.0, 0.25)]
-    assert f"The slider '{SLIDER}' is animated already; its keyframes were left as they are." in result.notes
+    assert f"The slider '{SLIDER}' is already animated; its keyframes were left as they are." in result.notes
 
 
 def test_other_animation_of_the_object_stays(figure: bpy.types.Object) -> None:

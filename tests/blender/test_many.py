@@ -52,7 +52,7 @@ def test_every_key_has_a_verdict(face: bpy.types.Object, quick_map: list[Any]) -
     assert ends(verdicts) == wanted
     words = {verdict.key: verdict.text for verdict in verdicts}
     assert words["Lean"].startswith("2 in-betweens")
-    assert words["Nothing"] == "shows the same as 'Basis'"
+    assert words["Nothing"] == "has the same shape as 'Basis'"
     assert "not finite" in words["Broken"]
     assert on_keys(face) == ["Lean", "Stretch", "Wide"]
     assert face.data.shape_keys.key_blocks["Wide_33"].relative_key.name == "Lean"

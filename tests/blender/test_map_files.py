@@ -66,7 +66,7 @@ def test_the_frames_are_those_of_the_bake(
     ("change", "sentence"),
     [
         ("moved", "From 'Basis' to 'Lean': The stored map belongs to other keys or another mesh"),
-        ("renamed", "has maps through 'Lean', but 'Figure' has no shape key of that name"),
+        ("renamed", "has maps for 'Lean', but 'Figure' has no shape key of that name"),
         ("damaged", "The stored map is damaged"),
         ("cut", "sizes of its maps do not fit"),
         ("other", "is not a file of maps between shape keys"),
@@ -98,14 +98,14 @@ def test_maps_of_keys_that_were_changed_are_not_saved(
 ) -> None:
     bake(from_key="Basis", to_key="Lean")
     figure.data.shape_keys.key_blocks["Lean"].points[0].co.x += 0.001
-    with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
+    with pytest.raises(RuntimeError, match="no longer matches the keys; re-bake first"):
         bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
     assert not list(tmp_path.iterdir())
 
 
 def test_a_file_must_be_named(figure: bpy.types.Object, quick_map: list[FitOptions], tmp_path: Path) -> None:
     bake(from_key="Basis", to_key="Lean")
-    with pytest.raises(RuntimeError, match="Name a file to write to"):
+    with pytest.raises(RuntimeError, match="Name a file to write"):
         bpy.ops.qc3d.save_map()
     with pytest.raises(RuntimeError, match="Name a file to read"):
         bpy.ops.qc3d.load_map()

@@ -292,7 +292,7 @@ class TestBetweenTwoBakes:
     @pytest.mark.parametrize(
         ("change", "said"),
         [
-            ("del obj[slider]; obj[slider] = 'text'", "is not a number any more"),
+            ("del obj[slider]; obj[slider] = 'text'", "is no longer a number"),
             ("obj[slider] = float('nan')", "has no value"),
         ],
     )

@@ -139,7 +139,7 @@ def test_a_mirror_object_without_size_is_refused() -> None:
     bpy.context.collection.objects.link(empty)
     empty.scale = (0.0, 1.0, 1.0)
     mirrored(obj, mirror_object=empty)
-    with pytest.raises(InputError, match=r"'Flat' has no size"):
+    with pytest.raises(InputError, match=r"'Flat' has the scale 0"):
         mirror_planes(obj)
 
 

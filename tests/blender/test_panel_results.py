@@ -127,7 +127,7 @@ def test_a_bake(even: bpy.types.Object) -> None:
 def test_a_lost_key_is_said(even: bpy.types.Object) -> None:
     key = even.data.shape_keys.key_blocks["Lean.L"]
     key.name, key.points[0].co.x = "Other", 7.0  # another name alone would be followed
-    sentence = "Shape key 'Lean.L' was renamed or deleted; give it its name back to re-bake, or bake anew."
+    sentence = "Shape key 'Lean.L' was renamed or deleted; restore its name to re-bake, or make a new bake."
     assert sentence in drawn(even).texts
 
 

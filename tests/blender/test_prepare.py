@@ -112,7 +112,7 @@ def test_a_map_of_another_version_is_made_again_and_a_note_says_so(
     assert bpy.ops.qc3d.prepare(**PAIR) == {'FINISHED'}
     monkeypatch.undo()
     bake()
-    note = f"The map that was kept from 'Basis' to 'Lean' was stored by {which} version of QC3D and was made again."
+    note = f"The stored map from 'Basis' to 'Lean' was made by {which} version of QC3D and was computed again."
     assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
     (data,) = map_properties().values()
     assert storage.why_unusable(bytes(data)) is None
@@ -127,7 +127,7 @@ def test_a_map_of_another_version_is_not_saved_as_a_file(
 ) -> None:
     bake()
     monkeypatch.setattr(storage, "FORMAT_VERSION", storage.FORMAT_VERSION + 1)
-    with pytest.raises(RuntimeError, match="is no more that of the keys; re-bake first"):
+    with pytest.raises(RuntimeError, match="no longer matches the keys; re-bake first"):
         bpy.ops.qc3d.save_map(filepath=str(tmp_path / "a.qc3dmap"))
     assert list(tmp_path.iterdir()) == []
 
@@ -138,7 +138,7 @@ def test_a_damaged_map_is_made_again_and_a_note_says_so(figure: bpy.types.Object
     whole = map_properties()[name]
     figure.data.shape_keys[name] = whole[:100]
     bake(count=2)
-    note = "The map that was kept from 'Basis' to 'Lean' is damaged and was made again."
+    note = "The stored map from 'Basis' to 'Lean' is damaged and was computed again."
     assert note in Record.read(figure.data.shape_keys).chains[0].result.notes
     assert len(quick_map) == 2
     assert len(map_properties()[name]) == len(whole)

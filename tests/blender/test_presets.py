@@ -75,5 +75,5 @@ class TestPreferences:
 def test_cancel_has_nothing_to_cancel() -> None:
     assert jobs.current() is None
     assert not bpy.ops.qc3d.cancel.poll()
-    with pytest.raises(RuntimeError, match="Nothing is being baked"):
+    with pytest.raises(RuntimeError, match="No bake is running"):
         bpy.ops.qc3d.cancel()

@@ -91,7 +91,7 @@ def test_a_record_of_an_older_version(baked: bpy.types.Object, state: State) -> 
         del chain["request"], chain["result"]
     keys[PROPERTY] = json.dumps(stored)
     before = state()
-    with pytest.raises(RuntimeError, match="not known any more; bake anew"):
+    with pytest.raises(RuntimeError, match="are unknown; bake anew"):
         bpy.ops.qc3d.rebake()
     assert state() == before
     assert bpy.ops.qc3d.bake_inbetweens(
@@ -105,7 +105,7 @@ def test_a_key_that_was_deleted(baked: bpy.types.Object, state: State) -> None:
     key.name, key.points[0].co.x = "Other", 7.0  # another name alone would be followed
     before = state()
     for again in (bpy.ops.qc3d.rebake, bpy.ops.qc3d.live_scrub):
-        with pytest.raises(RuntimeError, match="Shape key 'Lean' was renamed or deleted; give it its name back"):
+        with pytest.raises(RuntimeError, match="Shape key 'Lean' was renamed or deleted; restore its name"):
             again()
     assert state() == before
     baked.data.shape_keys.key_blocks["Other"].name = "Lean"

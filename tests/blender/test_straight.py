@@ -53,7 +53,7 @@ def test_the_straight_blend_is_baked_instead(mirrored: bpy.types.Object, shapes:
     assert chain.result.folds is None
     assert not kept_measures.has(keys, chain.slider)
     assert bpy.ops.qc3d.rebake() == {'FINISHED'}
-    with pytest.raises(RuntimeError, match="made without a map; bake in another mode"):
+    with pytest.raises(RuntimeError, match="makes no map; bake in another mode"):
         bpy.ops.qc3d.save_map(filepath=str(tmp_path / "map.qc3dmap"))
     assert list(tmp_path.iterdir()) == []
 

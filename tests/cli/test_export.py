@@ -43,7 +43,7 @@ def test_every_format(ending: str, baked: Path, bar: dict[str, np.ndarray], tmp_
 @pytest.mark.parametrize(
     ("output", "more", "name", "said"),
     [
-        ("bar.obj", (), "Bar", "ends in none of"),
+        ("bar.obj", (), "Bar", "has none of the extensions"),
         ("bar.usda", ("--shapes", "0"), "Bar", "0 in-betweens"),
         ("bar.usda", (), "Bus", "no object 'Bus'"),
         ("bar.usda", (), "Plain", "shape key"),

@@ -133,6 +133,15 @@ def test_every_setting_reaches_the_solver(bar_file: Path, tmp_path: Path, monkey
         interpolate(bar_file, tmp_path / "frames.npz", *options, "--seed", "5")
 
 
+def test_the_quality_exact_meets_the_second_key(bar_file: Path, tmp_path: Path) -> None:
+    told = tmp_path / "report.json"
+    assert interpolate(bar_file, tmp_path / "frames.npz", "--quality", "exact", "--report", str(told)) == 0
+    report = json.loads(told.read_text())
+    assert report["quality"] == "exact"
+    assert report["residual"]["max"] <= 1e-4
+    assert report["folds"] == {"map": 0, "frames": [0, 0, 0]}
+
+
 def test_the_same_seed_gives_the_same_frames(bar_file: Path, tmp_path: Path) -> None:
     outputs = [tmp_path / "one.npz", tmp_path / "two.npz"]
     for output in outputs:

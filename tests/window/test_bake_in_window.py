@@ -87,7 +87,7 @@ def test_a_cancelled_bake_changes_nothing(window: Window, button: bool) -> None:
         window.press("Escape")
     window.wait_gone(child)
     print(f"the child process was gone after {time.monotonic() - began:.2f} s")
-    window.wait_for("'Bake In-Betweens was cancelled; nothing was changed.' in reports()")
+    window.wait_for("'Bake In-Betweens was canceled; nothing was changed.' in reports()")
     assert window.ask("state()") == before
     assert window.ask("child()") is None
     assert list(window.folder.glob("qc3d-*")) == []

@@ -72,9 +72,9 @@ def test_an_undo_meanwhile_has_a_defined_outcome(window: Window) -> None:
 
 def test_there_is_never_more_than_one_bake(window: Window) -> None:
     child = start(window, "finest")
-    with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
+    with pytest.raises(RuntimeError, match="Bake In-Betweens is running; wait for it or cancel it first"):
         window.ask("with inside('UI'): bpy.ops.qc3d.bake_inbetweens('INVOKE_DEFAULT')")
-    with pytest.raises(RuntimeError, match="Bake In-Betweens is at work; wait for it or cancel it first"):
+    with pytest.raises(RuntimeError, match="Bake In-Betweens is running; wait for it or cancel it first"):
         window.ask("bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Bend 90')")
     assert window.ask("child()") == child
     window.press("Escape")

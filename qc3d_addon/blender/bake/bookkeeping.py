@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept beside the shape keys of a chain: its entry in the record, its measures and shapes, its maps."""
+"""Data stored beside the shape keys of a chain: its entry in the record, its measures, shapes and maps."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from ..store.records import PROPERTY, Chain, Record
 def remember(
     obj: bpy.types.Object, record: Record, chain: Chain, measures: Measures | None, shapes: Shapes, undo: ExitStack
 ) -> None:
-    """Keep the record, and measures and shapes of the chain whose keys were written; show its heat map, where it is on.
+    """Store the record and the measures and shapes of a chain whose keys were written; update a shown heat map.
 
-    ``shapes`` are those that the bake made, by place, without what was sculpted into them.
+    ``shapes`` are those that the bake computed, by place, without what was sculpted into them.
     """
     keys = keys_of(obj)
     kept_shapes.keep(keys, chain.slider, key_coordinates(obj, base_key(keys, chain).name), shapes, undo)
@@ -37,7 +37,7 @@ def remember(
 
 
 def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -> None:
-    """Forget a chain: its entry in the record, its measures, and the maps that no other chain needs."""
+    """Remove the entry of a chain from the record, its measures and shapes, and the maps that no other chain needs."""
     kept_measures.forget(keys, chain.slider, undo)
     kept_shapes.forget(keys, chain.slider, undo)
     record.chains.remove(chain)
@@ -52,7 +52,7 @@ def forget(keys: bpy.types.Key, record: Record, chain: Chain, undo: ExitStack) -
 
 
 def forget_all(obj: bpy.types.Object) -> None:
-    """Forget all that is kept with the keys of ``obj``, sound or not, and hide its heat map; keys and sliders stay."""
+    """Remove all that is stored with the keys of ``obj``, damaged or not, and its heat map; keys and sliders stay."""
     keys = keys_of(obj)
     heat_map.hide(obj)
     with ExitStack() as undo:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The objects that in-betweens must not touch, as arrays."""
+"""Colliders, the objects that in-betweens must not enter, as arrays."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def read_colliders(obj: bpy.types.Object, name: str, through: Sequence[str]) -> 
     Raises
     ------
     InputError
-        If there is no such collection, or it has no meshes with faces, or only ``obj`` itself.
+        If there is no such collection, or it has no mesh with faces besides ``obj`` itself.
     """
     from ...solver.collision.colliders import Collider
 
@@ -36,7 +36,7 @@ def read_colliders(obj: bpy.types.Object, name: str, through: Sequence[str]) -> 
         return None
     collection = bpy.data.collections.get(name)
     if collection is None:
-        raise InputError(f"There is no collection '{name}'; choose the one with the objects not to touch.")
+        raise InputError(f"There is no collection '{name}'; choose the collection with the colliders.")
     meshes = [other for other in collection.all_objects if other.type == 'MESH' and other != obj]
     parts = []
     for other in meshes:
@@ -48,19 +48,19 @@ def read_colliders(obj: bpy.types.Object, name: str, through: Sequence[str]) -> 
             faces = faces[:, ::-1]  # a mirrored object is turned inside out
         parts.append(Collider.checked(points @ to_object[:3, :3].T + to_object[:3, 3], faces))
     if not parts:
-        raise InputError(f"The collection '{name}' has no other meshes with faces; put the objects not to touch in it.")
+        raise InputError(f"The collection '{name}' has no other meshes with faces; put the colliders into it.")
     return Collider.joined(parts)
 
 
 def changed_since(obj: bpy.types.Object, name: str, through: Sequence[str], planned: Collider | None) -> list[str]:
-    """A sentence where the collection's meshes are not any more, as seen from ``obj``, what a bake was planned with."""
+    """A sentence if the collection's meshes, as seen from ``obj``, have changed since a bake was planned."""
     try:
         found = read_colliders(obj, name, through)
     except InputError:
         found = None
     if planned is None or (found is not None and _same(found, planned)):
         return []
-    return [f"The objects of '{name}' were changed meanwhile; re-bake to keep off where they are now."]
+    return [f"The colliders in '{name}' were changed during the bake; re-bake to use their present places."]
 
 
 def _same(one: Collider, other: Collider) -> bool:

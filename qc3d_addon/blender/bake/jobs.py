@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one piece of work that runs in the background: how far it is, and how it is stopped."""
+"""The one job that runs in the background: its progress, and how it is stopped."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Job:
-    """A task at work in a child process, as the panel shows it: one of a row of tasks, counted from 0.
+    """A task that runs in a child process, as the panel shows it: number ``part``, from 0, of ``parts`` tasks.
 
     Raises
     ------
@@ -39,30 +39,30 @@ class Job:
 
     @property
     def seconds(self) -> float:
-        """How long it has been at work."""
+        """Time since its start, in seconds."""
         return clock.monotonic() - self._started
 
     def poll(self) -> Outcome | None:
-        """The outcome when it is there; raises QC3DError where the work failed."""
+        """The outcome once there is one, otherwise None; raises QC3DError if the task failed."""
         return self._worker.poll()
 
     @property
     def stage(self) -> str:
-        """What it does now, in words."""
+        """Name of the stage that runs now."""
         return "Starting" if self._worker.progress is None else self._worker.progress.label
 
     @property
     def fraction(self) -> float:
-        """How much of all the work is done, 0..1."""
+        """Fraction of all the tasks that is done, in [0, 1]."""
         own = 0.0 if self._worker.progress is None else self._worker.progress.overall
         return (self._part + own) / self._parts
 
     def at_end(self, call: Callable[[], None]) -> None:
-        """Call this when the job ends, in whatever way: Blender drops a running operator without asking it."""
+        """Call this when the job ends in any way: Blender may drop a running operator without telling it."""
         self._at_end.callback(call)
 
     def stop(self) -> None:
-        """End the child process, remove its files, and do what was left for the end."""
+        """End the child process, remove its files, and make the calls of ``at_end``."""
         with self._at_end:
             self._worker.close()
 
@@ -71,12 +71,12 @@ _current: Job | None = None
 
 
 def current() -> Job | None:
-    """The job that runs now."""
+    """The job that is running, or None."""
     return _current
 
 
 def begin(label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1) -> Job:
-    """Start a job, or one of a row of them; there is never more than one at work.
+    """Start a job, or one of several in a row; at most one runs at a time.
 
     Raises
     ------
@@ -96,18 +96,18 @@ def begin(label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1)
 
 def busy_problem() -> str | None:
     """Why nothing new can be started, or None."""
-    return None if _current is None else f"{_current.label} is at work; wait for it or cancel it first."
+    return None if _current is None else f"{_current.label} is running; wait for it or cancel it first."
 
 
 def cancel() -> None:
-    """Stop the job, if there is one; what waits for it finds out by ``is_cancelled``."""
+    """Stop the job, if there is one; whoever waits for it sees ``is_cancelled``."""
     if _current is not None:
         _current.is_cancelled = True
         end()
 
 
 def end() -> None:
-    """Forget the job and free what it holds; nothing happens where there is none."""
+    """Drop the job, if there is one, and free what it holds."""
     global _current
     job, _current = _current, None
     if job is not None:
@@ -116,7 +116,7 @@ def end() -> None:
 
 @compat.persistent
 def _on_load(*_: object) -> None:
-    cancel()  # what it was started for is gone
+    cancel()  # its object belongs to the file that is being closed
 
 
 def register() -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every key at once, each on itself: which keys there are, and what becomes of each, in words."""
+"""Bakes many keys in one run, each played by its own value, and reports the result for each key."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .request import BakeRequest
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
-# A straight blend that leaves the motion by less, of the size, needs no in-betweens: a hair's breadth on a character.
+# Relative to the size. A key whose motion leaves the straight blend by less needs no in-betweens.
 STRAIGHT_ENOUGH = 1e-3
 
 Ended = Literal["baked", "straight", "left", "failed"]
@@ -31,18 +31,18 @@ Ended = Literal["baked", "straight", "left", "failed"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one key.
+    """The result for one key.
 
     Parameters
     ----------
     key
-        Its name.
+        Name of the key.
     ended
-        ``baked``; ``straight``: it needs no in-betweens; ``left``: nothing was to be done; ``failed``.
+        ``baked``; ``straight``: it needs no in-betweens; ``left``: there was nothing to do; ``failed``.
     text
-        That in words.
+        The result in words.
     report
-        Of the bake, as plain values; empty where there was none.
+        Report of the bake, as plain values; empty without one.
     """
 
     key: str
@@ -55,7 +55,7 @@ class Verdict:
 
 
 def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
-    """The keys of an object that are its user's own and have a value to play in-betweens on.
+    """Names of the user's own keys of an object that can play in-betweens by their value: all except the Basis.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def bakeable_keys(obj: bpy.types.Object | None) -> list[str]:
 
 
 def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
-    """The names, each once; raises InputError where one is no key that in-betweens can play on."""
+    """The names without repetitions; raises InputError if one is not a key that can play in-betweens."""
     known, blocks = bakeable_keys(obj), keys_of(obj).key_blocks
     for name in names:
         if name not in blocks:
@@ -82,12 +82,12 @@ def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
 
 
 def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> Plan | Verdict:
-    """What to compute for a key, or what there is to say where nothing is to be computed.
+    """The plan for a key, or the verdict if there is nothing to compute.
 
     Parameters
     ----------
     choices
-        Everything but the keys; a chain that the key plays already keeps the keys that it goes through.
+        The request except for the keys; a chain that the key already plays keeps the keys that it goes through.
     """
     try:
         keys = keys_of(checks.require_object(obj))
@@ -98,18 +98,18 @@ def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> P
         if chain is not None and chain.through == through and chain.request == request.remembered():
             is_whole = chain_keys.owned_keys(keys, chain).keys() == chain.keys.keys()
             if is_whole and chain.digests == tuple(digest(keys.key_blocks[other]) for other in through):
-                return Verdict(name, "left", "baked already, and its keys are as they were", {})
+                return Verdict(name, "left", "already baked, and its keys have not changed", {})
         plan = plan_bake(obj, request)
     except QC3DError as error:
         return Verdict(name, "failed", str(error), {})
     pair = next(iter(plan.task.pairs.values()))
     if len(plan.task.pairs) == 1 and np.array_equal(pair.key0, pair.key1):
-        return Verdict(name, "left", f"shows the same as '{base}'", {})
+        return Verdict(name, "left", f"has the same shape as '{base}'", {})
     return plan
 
 
 def write_key(plan: Plan, outcome: Outcome | QC3DError) -> Verdict:
-    """Write the in-betweens of a key, unless it needs none; what became of it."""
+    """Write the in-betweens of a key unless it needs none; returns the result for the key."""
     name = plan.request.keys[-1]
     if isinstance(outcome, QC3DError):
         return Verdict(name, "failed", str(outcome), {})
@@ -129,12 +129,12 @@ def bake_keys(
     choices: BakeRequest,
     carry_out: Callable[[Plan, int], Outcome],
 ) -> list[Verdict]:
-    """Bake keys of an object, one after the other, each on itself, with nothing written before all are done.
+    """Bake keys of an object one after the other, each played by its own value; nothing is written before the last.
 
     Parameters
     ----------
     carry_out
-        Does the work of a plan, which is that of the key of this number; may raise QC3DError.
+        Computes a plan, given the number of its key; may raise QC3DError.
     """
     done: list[tuple[Plan, Outcome | QC3DError] | Verdict] = []
     for number, name in enumerate(require_own_keys(obj, names)):
@@ -162,7 +162,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def _beyond_straight(plan: Plan, outcome: Outcome) -> float:
-    """How far the motion leaves the straight blend, over the size; infinite where it goes through other keys."""
+    """Largest distance of the motion from the straight blend, over the size; infinite with keys in between."""
     bake = outcome.bake
     if bake is None or len(plan.request.keys) > 2:
         return float("inf")
@@ -173,7 +173,7 @@ def _beyond_straight(plan: Plan, outcome: Outcome) -> float:
 
 
 def _words(report: dict[str, Any]) -> str:
-    """What a bake made of a key: how many in-betweens, and what is wrong with them."""
+    """The number of in-betweens of a key, and their crossings and folds, in words."""
     count, crossings, folds = report["count"], report["crossings"], report["folds"]["frames"]
     words = f"{count} in-between{'' if count == 1 else 's'}"
     known = [crossed or 0 for crossed in crossings]

@@ -27,7 +27,7 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     Raises
     ------
     InputError
-        If the keys were changed since, so that there is no such map any more, or the file cannot be written.
+        If the keys were changed since, so that the map no longer matches them, or the file cannot be written.
     """
     from ...solver.fit.files import KeptMaps, write_maps
     from ...solver.fit.storage import why_unusable
@@ -37,12 +37,12 @@ def save_maps(obj: bpy.types.Object, chain: Chain, path: Path) -> int:
     record = Record.read(keys)
     request = request_again(obj, chain)
     if not needs_fits(request.frame_options.mode):
-        raise InputError("A straight blend is made without a map; bake in another mode to have one.")
+        raise InputError("Mode straight makes no map; bake in another mode to have one.")
     maps = {}
     for ends, pair in mesh_data.read_pairs(obj, chain.through, chain.base).items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
         if data is None or why_unusable(data) is not None:
-            raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' is no more that of the keys; re-bake first.")
+            raise InputError(f"The map from '{ends[0]}' to '{ends[1]}' no longer matches the keys; re-bake first.")
         maps[ends] = data
     write_maps(path, KeptMaps(chain.through, request.fit_options, maps))
     return len(maps)
@@ -64,7 +64,7 @@ def load_maps(obj: bpy.types.Object, path: Path) -> KeptMaps:
     read = read_maps(path)
     for name in read.through:
         if name not in keys.key_blocks:
-            raise InputError(f"{path.name} has maps through '{name}', but '{obj.name}' has no shape key of that name.")
+            raise InputError(f"{path.name} has maps for '{name}', but '{obj.name}' has no shape key of that name.")
     pairs = mesh_data.read_pairs(obj, read.through)
     for ends in pairwise(read.through):
         with naming_pair(*ends, read.through):

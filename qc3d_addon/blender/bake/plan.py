@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between an object and the solver: what to compute, read from the object, and what came of it, written to it.
+"""Between an object and the solver: reads from the object what to compute, and writes the outcome to it.
 
-Time passes in between, and the animator may do anything: nothing of Blender's is held on to, the object is found
-again, and what was read is compared before anything is written.
+In the time between, the user may do anything. Therefore no Blender data is held, the object is looked up again, and
+the keys are compared with those that were read before anything is written.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to compute for an object, and how to find it again.
+    """What to compute for an object, and how to find the object again.
 
     Parameters
     ----------
     request
-        What was asked for.
+        The request for the bake.
     task
-        The work.
+        The task for the solver.
     object_id
-        Blender's number of the object, which stays with it for as long as the file is open, through renaming and undo.
+        The object's ``session_uid``, which survives renaming and undo while the file is open.
     object_name
-        What the object was called.
+        Name of the object when the plan was made.
     notes
-        Sentences for the user about what will be done.
+        Sentences for the user.
     """
 
     request: BakeRequest
@@ -58,19 +58,19 @@ class Plan:
     notes: tuple[str, ...] = ()
 
     def locate(self) -> bpy.types.Object | None:
-        """The object, whatever became of it; None where it was deleted."""
+        """The object, even if it was renamed or changed; None if it was deleted."""
         obj = bpy.data.objects.get(self.object_name)
         if obj is not None and obj.session_uid == self.object_id:
             return obj
         return next((obj for obj in bpy.data.objects if obj.session_uid == self.object_id), None)
 
     def find_object(self) -> bpy.types.Object:
-        """The object as it is now, where it can still be written to.
+        """The object, after checking that the outcome can still be written to it.
 
         Raises
         ------
         InputError
-            If it is gone, is being edited, or what was read from it has changed.
+            If it was deleted, is being edited, or its keys have changed since the plan was made.
         """
         obj = self.locate()
         if obj is None:
@@ -87,7 +87,7 @@ class Plan:
 
 
 def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
-    """Plan to make the map of every two keys that follow each other anew.
+    """Plan to compute the map of every two consecutive keys again.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
 
 
 def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
-    """Plan the in-betweens of two keys or a row of keys; maps that are kept and still fit are used again.
+    """Plan the in-betweens of two or more keys; stored maps that still match the keys are used again.
 
     Raises
     ------
@@ -128,14 +128,14 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     play = request.play_options
     play = replace(play, also_at=(*play.also_at, *Sculpted.of(obj, chain).places))
     if play.tolerance > 0.0 and chain.request.get("tolerance") == play.tolerance:
-        # Baked again with the same tolerance a chain does not lose steps, so that its keys can stay.
+        # With the same tolerance, a re-bake keeps all steps, so that their keys can stay.
         play = replace(play, also_at=(*play.also_at, *chain.places[1:-1]))
     usable, notes = {}, []
     for ends, pair in pairs.items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
         problem = None if data is None else why_unusable(data)
         if problem is not None:
-            notes.append(f"The map that was kept from '{ends[0]}' to '{ends[1]}' {problem} and was made again.")
+            notes.append(f"The stored map from '{ends[0]}' to '{ends[1]}' {problem} and was computed again.")
         elif data is not None:
             usable[ends] = data
     collider = colliders.read_colliders(obj, request.colliders, request.keys)
@@ -146,12 +146,12 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
 
 
 def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
-    """What a chain was baked from, to be made again.
+    """The request that a chain was baked with, to bake it again.
 
     Raises
     ------
     InputError
-        If the object cannot be used, or keys that the chain goes through are not there any more.
+        If the object cannot be used, or keys that the chain goes through no longer exist.
     """
     problem = checks.chain_problem(keys_of(checks.require_object(obj)), chain)
     if problem is not None:
@@ -160,12 +160,12 @@ def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
 
 
 def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
-    """Plan the frames of a baked chain as densely as a preview needs, evenly spaced before any easing.
+    """Plan the frames of a baked chain for live scrub: densely and evenly spaced, without easing.
 
     Raises
     ------
     InputError
-        If the object or the keys cannot be used any more.
+        If the object or the keys can no longer be used.
     """
     from ...solver.frames.bake import evenly_spaced
 
@@ -178,12 +178,12 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
 
 
 def write_maps(plan: Plan, outcome: Outcome) -> None:
-    """Keep the maps with the object's keys, for later bakes.
+    """Store the maps with the object's keys, for later bakes.
 
     Raises
     ------
     InputError
-        If the object is gone or was changed meanwhile; it is as it was.
+        If the object was deleted or changed during the work; nothing is written then.
     """
     keys = keys_of(plan.find_object())
     record = Record.read(keys)
@@ -194,12 +194,12 @@ def write_maps(plan: Plan, outcome: Outcome) -> None:
 
 
 def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
-    """Write the frames as shape keys that one slider plays.
+    """Write the frames as shape keys that one key or slider plays.
 
     Raises
     ------
     InputError
-        If the object is gone or was changed meanwhile; it is as it was.
+        If the object was deleted or changed during the work; nothing is written then.
     """
     obj, request, bake = plan.find_object(), plan.request, outcome.bake
     assert bake is not None
@@ -226,7 +226,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         notes += double_motion(obj, chain, record.chains)
         notes += unknown_inbetweens(keys, chain, record.chains) if chain.on_key else []
         if obj.show_only_shape_key:
-            notes.append(f"'{obj.name}' shows its active key only; unpin that to see the in-betweens play.")
+            notes.append(f"'{obj.name}' shows only its active key; unpin it to see the in-betweens play.")
         report = {
             "object": obj.name,
             "from": request.keys[0],
@@ -252,7 +252,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
 
 
 def kept_map(ends: tuple[str, str], pair: KeyPair, options: FitOptions) -> KeptMap:
-    """Where the map of a pair is kept that was made with these options."""
+    """The entry of the record for the map of a pair that was made with these options."""
     from ...solver.fit.storage import fingerprint
 
     return KeptMap(*ends, f"{fingerprint(pair)} {options.identity}")
@@ -269,7 +269,7 @@ def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome
 
 
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
-    """The entry of these keys in the record, made where there is none."""
+    """The entry of these keys in the record; a new one is added if there is none."""
     on_key = request.keys[-1] if request.play_on == "key" else ""
     mode = request.frame_options.mode
     chain = record.chain_on_key(on_key) if on_key else record.chain(request.keys, mode)
@@ -284,7 +284,7 @@ def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain
 
 
 def _steps_of_keys(places: tuple[float, ...], request: BakeRequest) -> dict[int, str]:
-    """Which step shows which of the request's keys."""
+    """Names of the request's keys, by the step that shows them."""
     from ...solver.frames.easing import uneased
 
     at_keys = uneased(np.linspace(0.0, 1.0, len(request.keys)), request.frame_options.easing)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shows how far the running job is, in the status bar and in the sidebars of the 3D views."""
+"""Shows the progress of the running job in the status bar and in the sidebars of the 3D views."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def draw_bar(layout: bpy.types.UILayout, job: jobs.Job) -> None:
 
 
 def show(context: bpy.types.Context) -> None:
-    """Draw the status bar and the sidebars anew with what the job has reached."""
+    """Redraw the status bar and the sidebars with the progress of the job."""
     if context.workspace is not None:
         context.workspace.status_text_set(_draw_status)
     _redraw_sidebars()
@@ -41,10 +41,10 @@ def is_at(window: bpy.types.Window, x: int, y: int) -> bool:
 
 
 def clear() -> None:
-    """Give the status bar back to Blender, and draw the sidebars anew."""
+    """Give the status bar back to Blender and redraw the sidebars."""
     override: Any = bpy.context.temp_override  # the stubs of 5.2 know no block that it can be for
     for window in present(bpy.context.window_manager).windows:
-        with override(window=window):  # only its own status bar is drawn anew
+        with override(window=window):  # the call redraws only the status bar of the context's window
             window.workspace.status_text_set(None)
     _redraw_sidebars()
 

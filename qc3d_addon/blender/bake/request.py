@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake is asked for, and what it made."""
+"""The request for a bake, and its result."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ...solver.settings import DENSE_STEPS, FitOptions, FrameOptions, PlayOption
 from ..store import names
 from ..store import stored_values as stored
 
-# Frames of every two keys that a preview is a spline through. It missed the others by at most 6.5e-6 of the size, where
-# benchmarks/scrub.py measured it.
+# Frames between every two keys that a preview interpolates with a spline. benchmarks/scrub.py measured an error of at
+# most 6.5e-6 of the size between them.
 PREVIEW_STEPS = 24
 
 PlayOn = Literal["auto", "key", "slider"]
@@ -26,7 +26,7 @@ class BakeRequest:
     Parameters
     ----------
     keys
-        Names of two keys or more, from the first to the last; the same name may come again, but not twice in a row.
+        Names of two keys or more, from the first to the last; a name may be repeated, but not twice in a row.
     count
         Number of in-betweens between every two keys that follow each other, evenly spaced.
     fit_options, frame_options
@@ -34,15 +34,15 @@ class BakeRequest:
     keyframes
         First and last frame between which the slider goes from 0 to 1, or None to leave it without keyframes.
     tolerance
-        Where positive, as few in-betweens as show every moment within this distance, in the object's units; ``count``
-        is then not looked at.
+        If positive, the bake makes as few in-betweens as keep every vertex within this distance, in the object's own
+        units, and ignores ``count``.
     colliders
-        Name of a collection with objects that the in-betweens must not touch, or empty.
+        Name of a collection with objects that the in-betweens must not enter; empty for none.
     weights
-        What is played between the in-betweens: ``smooth``, or ``hats`` for straight blends.
+        How in-betweens are blended: ``smooth``, or ``hats`` for straight lines from each to the next.
     play_on
-        What plays them: the ``key``'s own value, which needs the first key to be what the last is relative to, a
-        ``slider`` of their own, or ``auto``: the key where it can be.
+        What plays them: ``key``, the value of the last key, which must be relative to the first; ``slider``, a new
+        custom property; or ``auto``, the key if possible.
     also_at
         Places of more in-betweens, each between 0 and 1 on the control.
     """
@@ -81,7 +81,7 @@ class BakeRequest:
         return PlayOptions(self.count, self.tolerance, self.weights, self.also_at)
 
     def remembered(self) -> dict[str, Any]:
-        """What another bake of the same keys needs to know, as plain values."""
+        """What a later bake of the same keys needs to know, as plain values."""
         return {
             "count": self.count,
             "tolerance": self.tolerance,
@@ -94,17 +94,17 @@ class BakeRequest:
 
     @property
     def base(self) -> str:
-        """Name of the key that the one which plays the in-betweens is relative to; empty where a slider does."""
+        """Name of the key that the playing key is relative to; empty if a slider plays the in-betweens."""
         return self.keys[0] if self.play_on == "key" else ""
 
     @classmethod
     def again(cls, keys: tuple[str, ...], remembered: dict[str, Any]) -> BakeRequest:
-        """The request that ``remembered`` came from, its keyframes left as they are.
+        """The request that ``remembered`` came from, without keyframes, so that those of the file stay.
 
         Raises
         ------
         InputError
-            If it is not what this version writes.
+            If the values are not what this version writes.
         """
         try:
             options = dict(stored.plain_dict(remembered["settings"]))
@@ -121,12 +121,12 @@ class BakeRequest:
                 play_on=remembered.get("play_on", "slider"),
             )
         except (KeyError, TypeError, ValueError, InputError) as error:
-            raise InputError("What the earlier bake was asked for is not known any more; bake anew.") from error
+            raise InputError("The options of the earlier bake are unknown; bake anew.") from error
 
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake made.
+    """The result of a bake.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class BakeResult:
     notes
         Sentences for the user.
     report
-        The pipeline's report with the names above: plain values that can be written as JSON.
+        The solver's report with the names above, as plain values that can be written as JSON.
     """
 
     slider: str

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baking in one go, as scripts, Blender's command and the command ``qc3d bake`` do it."""
+"""Baking in one call, for scripts, Blender's command line and the command ``qc3d bake``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
     from ...solver.support.progress import Progress
 
-_TIMES_THE_SIZE = 4  # of the file that was opened, which may be compressed, for what the bake adds besides keys
+# Estimate of the saved file's size, without its shape keys: this many times that of the opened one, which may be
+# compressed.
+_TIMES_THE_SIZE = 4
 
 OnProgress = Callable[["Progress"], None]
 Result = TypeVar("Result")
@@ -34,14 +36,14 @@ Result = TypeVar("Result")
 def bake_object(
     obj: bpy.types.Object | None, request: BakeRequest, on_progress: OnProgress | None = None
 ) -> BakeResult:
-    """Make the in-betweens of two keys or a row of keys, as shape keys that one slider plays, in this process.
+    """Bake the in-betweens of two or more keys in this process, as shape keys that one key or slider plays.
 
     Everything is computed and checked before anything is written.
 
     Raises
     ------
     QC3DError
-        If the object, the keys or the settings cannot be used; the object is as it was.
+        If the object, the keys or the settings cannot be used; nothing is written then.
     """
     # Imported where it is used: scipy would make Blender start slower.
     from ...solver.frames.task import carry_out
@@ -83,19 +85,19 @@ def bake_objects_together(
 def bake_object_keys(
     obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, on_progress: OnProgress | None = None
 ) -> list[Verdict]:
-    """Bake keys of an object, each on itself, in this process.
+    """Bake keys of an object in this process, each played by its own value.
 
     Parameters
     ----------
     names
-        Of the keys; empty for all.
+        Names of the keys; empty for all.
     choices
-        Everything but the keys.
+        The request except for the keys.
 
     Raises
     ------
     QC3DError
-        If the object or a name cannot be used; a key that cannot be baked only has a verdict that says so.
+        If the object or a name cannot be used. A key that cannot be baked raises nothing; its verdict says so.
     """
     from ...solver.frames.task import carry_out
     from ...solver.support.memory import machine_limit_mb
@@ -117,7 +119,7 @@ def bake_file(
 ) -> list[Result]:
     """Bake objects of a .blend file and save the result as another file.
 
-    The file is opened in this process, in place of what is open in it; scripts in it do not run.
+    The file is opened in this process and replaces the open one; scripts in it do not run.
 
     Parameters
     ----------
@@ -126,11 +128,11 @@ def bake_file(
     object_names
         Names of the objects to bake; empty for all meshes with two shape keys or more.
     work
-        Bakes them; gives for each what to return of it and, as plain values, what to report.
+        Bakes them; returns for each its result and its report, as plain values.
     output
         The .blend file to write; it may be the same as ``path``.
     report
-        A JSON file to write the report to, or None: that of the object, or of several by their names.
+        A JSON file for the report, or None. It has the report of the object or, for several, of each by its name.
 
     Raises
     ------
@@ -157,7 +159,7 @@ def bake_file(
 
 
 def opened_object(path: Path, name: str) -> bpy.types.Object:
-    """An object of a .blend file, which is opened in place of what is open; scripts in it do not run.
+    """An object of a .blend file, which replaces the open one; scripts in it do not run.
 
     Raises
     ------
@@ -169,7 +171,7 @@ def opened_object(path: Path, name: str) -> bpy.types.Object:
 
 
 def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
-    """The objects of these names, or all meshes with keys that do not share their mesh with one before."""
+    """The objects of these names, or all with keys that can be baked, one for each mesh."""
     meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH']
     for name in names:
         if name not in bpy.data.objects:
@@ -184,7 +186,7 @@ def _objects(path: Path, names: Sequence[str]) -> list[bpy.types.Object]:
 
 
 def _save(new: Path, output: Path, size: int) -> None:
-    """Save the file that is open, of about ``size`` bytes, as ``new``, which takes the place of ``output``."""
+    """Save the open file, of about ``size`` bytes, as ``new``, which then replaces ``output``."""
     from ...solver.files.atomic import require_room
 
     native_files.require_short(new, output)
@@ -195,9 +197,9 @@ def _save(new: Path, output: Path, size: int) -> None:
         problem = native_files.words(error, new, output)
     else:
         if new.exists() and not native_files.is_whole(new):
-            problem = "Blender wrote a part of it only"
+            problem = "Blender wrote only a part of it"
     if problem is not None:
-        require_room(output, size)  # Blender calls a full disk a file that is not there, or nothing at all
+        require_room(output, size)  # on a full disk, Blender reports another error or none
         raise InputError(f"{output} cannot be written: {problem}.")
 
 

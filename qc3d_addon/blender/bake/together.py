@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several objects of one character baked in one map: lashes stay on lids, clothes on skin."""
+"""Bakes several objects of one character in one map, so that lashes stay on lids and clothes on skin."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class JointPlan:
     Parameters
     ----------
     plans
-        Of each object by itself, the active one first.
+        Plan of each object by itself, the active one first.
     together
-        Their meshes joined, as the active object sees them.
+        The joined meshes, in the coordinates of the active object.
     task
-        The work on the joined meshes.
+        The task for the joined meshes.
     """
 
     plans: list[Plan]
@@ -51,14 +51,14 @@ def plan_together(objects: Sequence[bpy.types.Object], request: BakeRequest) -> 
     Parameters
     ----------
     objects
-        Each once.
+        The objects, without repetitions.
     request
-        The same for all.
+        The request for all of them.
 
     Raises
     ------
     InputError
-        If one cannot be baked, shares its mesh with another, or has no size along an axis.
+        If one cannot be baked, shares its mesh with another, or has the scale 0 along an axis.
     """
     from ...solver.frames.task import Task
     from ...solver.frames.together import PlacedMesh, Together
@@ -93,12 +93,12 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
     Parameters
     ----------
     one_control
-        Whether what plays those of the first object drives the others, where nothing else does.
+        Whether the control of the first object drives those of the others, unless something else drives them.
 
     Raises
     ------
     InputError
-        If one of the objects is gone or was changed meanwhile; all are as they were.
+        If one of the objects was deleted or changed during the work; nothing is written then.
     """
     from ...solver.frames.task import Outcome as OwnOutcome
 
@@ -108,7 +108,10 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
     bakes = plan.together.apart(outcome.bake, plan.task.frame_options, plan.task.through)
     results = []
     for one, bake in zip(plan.plans, bakes, strict=True):
-        results.append(write_bake(one, OwnOutcome({}, bake)))
+        others = ", ".join(f"'{other.object_name}'" for other in plan.plans if other is not one)
+        said = f"Baked together with {others}; Re-Bake bakes '{one.object_name}' by itself." if others else ""
+        noted = replace(one, notes=(*one.notes, said)) if said else one
+        results.append(write_bake(noted, OwnOutcome({}, bake)))
     if one_control:
         leader, *followers = [_control(one) for one in plan.plans]
         for follower in followers:
@@ -119,7 +122,7 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
 def objects_with_keys(
     active: bpy.types.Object, others: Sequence[bpy.types.Object], names: Sequence[str]
 ) -> list[bpy.types.Object]:
-    """The active object and those of the others that have shape keys of all these names, each mesh once."""
+    """The active object and those others that have shape keys of all these names, one object for each mesh."""
     found = {active.data: active}
     for obj in others:
         if checks.object_problem(obj) is None and all(name in keys_of(obj).key_blocks for name in names):
@@ -128,7 +131,7 @@ def objects_with_keys(
 
 
 def follow(follower: Control, leader: Control) -> None:
-    """Let a driver keep a control where another one is; one that has a driver or keyframes is left alone."""
+    """Drive a control by another one, unless it already has a driver or keyframes."""
     animation = follower.owner.animation_data
     if animation is not None and animation.drivers.find(follower.path) is not None:
         return
@@ -146,5 +149,5 @@ def _control(plan: Plan) -> Control:
 def _matrix(obj: bpy.types.Object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
-        raise InputError(f"'{obj.name}' has no size along an axis; give it a scale other than 0.")
+        raise InputError(f"'{obj.name}' has the scale 0 along an axis; set another scale.")
     return matrix

@@ -18,19 +18,19 @@ from ..store import id_properties, names
 from ..store.mesh_data import set_key_coordinates
 from ..store.records import Chain
 
-_LEAST_STEPS = 24  # straight blends of so many miss a turn by 90 degrees by 0.05 % of the radius
+_LEAST_STEPS = 24  # with so many, straight lines miss a rotation by 90 degrees by 0.05 % of the radius
 
 
 def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object:
-    """Make the copy beside the object, in its collections; the slider of the object plays it.
+    """Make the copy in the object's collections; the slider of the object plays it.
 
-    Absolute keys are blended straight from one to the next by a single number, without values of their own. Between
-    the steps there are as many more as follow a smooth path closely; the copy has no other keys.
+    Blender interpolates absolute keys linearly from one to the next by a single number. To follow a smooth path
+    closely, the copy has additional keys between the steps; it has no others.
 
     Raises
     ------
     InputError
-        If a generated key was deleted, or the slider cannot play anything; nothing was made.
+        If a generated key was deleted, or the slider is not a number; nothing is changed then.
     """
     control = chain_keys.control_of(obj, chain)
     control.require()
@@ -45,7 +45,7 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
     with ExitStack() as undo:
         copy = copied(obj, undo)
         copy.name = mesh_of(copy).name = f"{obj.name} absolute"
-        heat_map.hide(copy)  # which is the original's
+        heat_map.hide(copy)  # it belongs to the original
         compat.clear_shape_keys(copy)
         for name in [name for name in copy.keys() if name.startswith("qc3d")]:  # noqa: SIM118 - not a dictionary
             del copy[name]
@@ -69,7 +69,7 @@ def copy_with_absolute_keys(obj: bpy.types.Object, chain: Chain) -> bpy.types.Ob
 
 
 def _denser(places: tuple[float, ...]) -> Floats:
-    """Places of absolute keys: as many even ones between every two as make ``_LEAST_STEPS`` at least."""
+    """Places of absolute keys: evenly subdivided between every two until there are at least ``_LEAST_STEPS``."""
     parts = -(-_LEAST_STEPS // (len(places) - 1))
     between = np.arange(parts) / parts
     inner = np.array(places[:-1])[:, None] + between * np.diff(places)[:, None]
@@ -77,7 +77,7 @@ def _denser(places: tuple[float, ...]) -> Floats:
 
 
 def copied(obj: bpy.types.Object, undo: ExitStack) -> bpy.types.Object:
-    """A copy of a mesh object, with a mesh and keys of its own; closing ``undo`` removes it without a trace."""
+    """A copy of a mesh object with its own mesh and keys; closing ``undo`` removes it without a trace."""
     original = mesh_of(obj)
     copy = obj.copy()
     undo.callback(_remove, copy, original)
@@ -86,7 +86,7 @@ def copied(obj: bpy.types.Object, undo: ExitStack) -> bpy.types.Object:
 
 
 def _remove(copy: bpy.types.Object, original: bpy.types.Mesh) -> None:
-    """Remove an object with its mesh and keys, if they are not the original's, and the actions that only they used."""
+    """Remove an object, its mesh and keys if they are not the original's, and the actions that only they used."""
     mesh, keys = mesh_of(copy), shape_keys_of(copy)
     actions = {block.animation_data.action for block in (copy, keys) if block is not None and block.animation_data}
     bpy.data.objects.remove(copy)

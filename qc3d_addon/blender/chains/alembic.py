@@ -17,20 +17,20 @@ from ..kinds import keys_of, mesh_of, present
 from ..store.records import Chain
 from .absolute_copy import copied
 
-# Of a vertex or a corner of a face: its position or normal in each frame; its index and place; its place in a texture.
+# Bytes per vertex or face corner: position or normal in each frame; index and position once; texture coordinates.
 _BYTES_OF_FRAME, _BYTES_ONCE, _BYTES_OF_TEXTURE = 12, 48, 16
 _BYTES_BESIDE = 2**20
 
 
 def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Chain, path: Path, frames: int) -> None:
-    """Write the object as its slider goes from 0 to 1 over a number of frames, 1 to ``frames``, modifiers included.
+    """Write the object, with modifiers, while its slider goes from 0 to 1 over the frames 1 to ``frames``.
 
     A temporary copy is animated and exported, so the object and its animation stay as they are.
 
     Raises
     ------
     InputError
-        If the file cannot be written; what was there is kept.
+        If the file cannot be written; an existing file stays as it is.
     """
     scene, layer = present(context.scene), present(context.view_layer)
     control = chain_keys.control_of(obj, chain)
@@ -63,7 +63,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
                     start=1,
                     end=frames,
                     selected=True,
-                    apply_subdiv=True,  # else a Subdivision modifier at the end is left out
+                    apply_subdiv=True,  # otherwise a Subdivision modifier at the end is left out
                     as_background_job=False,
                 )
             except RuntimeError as error:
@@ -74,25 +74,20 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
 
 
 def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:
-    """Let these objects be selected and no others."""
+    """Select exactly these objects."""
     for obj in layer.objects:
-        if obj is not None:  # as one that has just been removed
+        if obj is not None:  # an object that has just been removed is None
             obj.select_set(obj in objects, view_layer=layer)
     layer.objects.active = active
 
 
 def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:
-    """More bytes than the file will have. Where the disk gets full, Blender's exporter ends Blender.
+    """Upper bound of the file's size in bytes. On a full disk Blender's exporter crashes Blender.
 
-    The exporter evaluates modifiers as for a rendering, all but a subdivision surface at the end; the copy is set to
-    show in the viewport what that gives.
+    The exporter evaluates modifiers as for rendering; those of the copy are set so that the viewport shows the same.
     """
-    shown = [modifier for modifier in copy.modifiers if modifier.show_render]
-    last = shown[-1] if shown else None
-    if isinstance(last, bpy.types.SubsurfModifier) and last.subdivision_type == 'CATMULL_CLARK':
-        shown.pop()
     for modifier in copy.modifiers:
-        modifier.show_viewport = modifier in shown
+        modifier.show_viewport = modifier.show_render
         if isinstance(modifier, (bpy.types.SubsurfModifier, bpy.types.MultiresModifier)):
             modifier.levels = modifier.render_levels
     mesh = mesh_of(copy.evaluated_get(context.evaluated_depsgraph_get()))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a slider does over a range of frames, as keyframes of the shape keys themselves."""
+"""Replaces slider and drivers by keyframes of the shape keys themselves, over a range of frames."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from . import remove
 
 
 def positions(context: bpy.types.Context, control: Control, frames: range) -> NDArray[np.float64]:
-    """(k,) where a control is at each of ``frames``, whatever animates it: keyframes, drivers, strips.
+    """(k,) values of a control at each of ``frames``, whatever animates it: keyframes, drivers or NLA strips.
 
     Raises
     ------
     InputError
-        If there is no such slider, or it is no number at one of the frames.
+        If the slider does not exist, or is not a number at one of the frames.
     """
     scene = present(context.scene)
     current, part = scene.frame_current, scene.frame_subframe
@@ -44,22 +44,24 @@ def positions(context: bpy.types.Context, control: Control, frames: range) -> ND
 def bake_to_keyframes(
     context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain, frames: range
 ) -> list[str]:
-    """Give the keys of a chain keyframes in place of drivers, and let them go: they are the animator's own then.
+    """Replace the drivers of a chain's keys by keyframes and forget the chain: its keys are the user's own then.
 
     Returns
     -------
-    Sentences about what was left because other work depends on it.
+    list of str
+        Sentences about what was replaced, and about what stays because the user's own work depends on it.
 
     Raises
     ------
     InputError
-        If the slider is gone or no number, or a key or an action cannot be changed; nothing was changed.
+        If the slider does not exist or is not a number, or a key or an action cannot be changed; nothing is changed
+        then.
     """
     keys, scene = keys_of(obj), present(context.scene)
     control = shape_keys.require_removable(obj, chain)
     shape_keys.require_action(keys)
     control.require()
-    # As far as keys can go; what is infinite has no weights.
+    # Clipped to the range of shape keys, and since infinite positions have no weights.
     values = chain.weights.at(np.clip(positions(context, control, frames), -10.0, 10.0)).clip(-10.0, 10.0)
     owned = chain_keys.owned_keys(keys, chain)
     notes, animated = [], []
@@ -67,7 +69,7 @@ def bake_to_keyframes(
         for step, key in owned.items():
             curve = compat.ensure_fcurve(keys, value_path(key.name), undo)
             if len(curve.keyframe_points):
-                notes.append(f"Keyframes that '{key.name}' had under its driver were replaced.")
+                notes.append(f"Keyframes of '{key.name}', which its driver had overridden, were replaced.")
             animated.append((key, curve, values[:, step]))
         bookkeeping.forget(keys, record, chain, undo)
         undo.pop_all()
@@ -82,7 +84,7 @@ def bake_to_keyframes(
 def _put_in_place(
     animated: list[tuple[bpy.types.ShapeKey, bpy.types.FCurve, NDArray[np.float64]]], frames: NDArray[np.float64]
 ) -> None:
-    """Let curves with these values at ``frames`` do what the drivers of keys did."""
+    """Replace the drivers of keys by keyframes with these values at ``frames``."""
     for key, curve, values in animated:
         drivers.undrive(key)
         _set_keyframes(curve, frames, values)
@@ -90,7 +92,7 @@ def _put_in_place(
 
 
 def _set_keyframes(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Linear keyframes, those left out that lie on the line between their neighbours."""
+    """Set linear keyframes, except those on the straight line between their neighbors."""
     turns = np.ones(len(values), dtype=bool)
     turns[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2]) > 1e-9
     frames, values = frames[turns], values[turns]

@@ -21,40 +21,38 @@ from ..store.records import Chain, Record
 from ..store.summaries import Summary
 from .mirror_image import MirrorImage, mirror_image
 
-_SAME = 1e-4  # of the size: keys that were mirrored by other tools are rounded
+_SAME = 1e-4  # relative to the size: other tools round when they mirror keys
 
 
 def mirror_chain(
     obj: bpy.types.Object, record: Record, chain: Chain, use_topology: bool = False
 ) -> tuple[Chain, list[str]]:
-    """Make the mirror image of a chain, with keys of its own; one made before is brought up to date.
+    """Make the mirror image of a chain with its own keys, or update the one made before.
 
-    What a key's value plays goes onto the value of the key that is its mirror image; anything else gets a slider.
-
-    Every vertex goes where the mirror image of its partner goes, bit for bit where the Basis is symmetric to the bit.
-    The few that have no partner, which a sentence is returned about, move as what is nearest there. The sides in the
-    keys' names, such as
-    ".L", are flipped; names without a side get "mirrored" behind them.
+    If a key's value plays the chain, the value of the mirrored key plays the mirror image; otherwise a slider does.
+    Every vertex follows the mirror image of its partner, bit for bit if the Basis is exactly symmetric. Vertices
+    without a partner move like their surroundings on the other side; a returned sentence says so. The sides in the
+    keys' names, such as ".L", are flipped; names without a side get the suffix "_mirrored".
 
     Raises
     ------
     InputError
-        If the Basis is not nearly symmetric across x = 0, the chain is a mirror image itself, the other side was baked
-        from keys of its own, or keys cannot be written; nothing was changed.
+        If the Basis is not nearly symmetric across x = 0, the chain is itself a mirror image, the other side was baked
+        from its own keys, or keys cannot be written; nothing is changed then.
     """
     if chain.mirror_of:
-        raise InputError(f"'{chain.slider}' is the mirror image of '{chain.mirror_of}' itself; choose that one.")
+        raise InputError(f"'{chain.slider}' is itself the mirror image of '{chain.mirror_of}'; choose that one.")
     keys = keys_of(obj)
     steps = chain_keys.all_owned_keys(keys, chain)
     base = chain_keys.base_key(keys, chain).name
     image = mirror_image(obj, use_topology)
-    partners = image.partners
+    partners, notes = image.partners, image.note()
     shapes = {step: image.of(key_coordinates(obj, key.name)) for step, key in steps.items()}
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
     if through == chain.through:
         if chain.on_key:
-            raise InputError(f"'{chain.on_key}' has no side in its name, such as .L; its mirror image is not known.")
+            raise InputError(f"'{chain.on_key}' has no side such as .L in its name; add one to mirror it.")
         through = (*through[:-1], f"{through[-1]}_mirrored")
     on_key = through[-1] if chain.on_key else ""
     if on_key:
@@ -67,7 +65,7 @@ def mirror_chain(
         record.chains.append(mirrored)
     elif mirrored.result and not mirrored.mirror_of:
         raise InputError(
-            f"'{mirrored.slider}' was baked from keys of its own; remove it before it is made from '{chain.slider}'."
+            f"'{mirrored.slider}' was baked from its own keys; remove it before you mirror '{chain.slider}'."
         )
     measures = kept_measures.read(keys, chain.slider, len(partners))
     places = shape_keys.Steps(chain.places, chain.corners)
@@ -80,7 +78,7 @@ def mirror_chain(
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
         bookkeeping.remember(obj, record, mirrored, measures, made, undo)
-    return mirrored, image.note()
+    return mirrored, notes
 
 
 def _require_mirror_image(
@@ -97,7 +95,7 @@ def _require_mirror_image(
 
 
 def _mirrored_result(result: Summary | None, partners: NDArray[np.int64]) -> Summary | None:
-    """What the panel shows of the mirror image: the same, at the partner of the worst place."""
+    """The result of the mirror image for the panel: the same, with the partner of the worst vertex."""
     if result is None or result.worst is None or result.worst.vertex >= len(partners):
         return result
     return replace(result, worst=replace(result.worst, vertex=int(partners[result.worst.vertex])))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Takes away what bakes made, and nothing else."""
+"""Removes what bakes made, and nothing else."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
 
     Returns
     -------
-    Sentences about what was left because the animator's own work depends on it.
+    list of str
+        Sentences about what stays because the user's own work depends on it.
 
     Raises
     ------
@@ -33,19 +34,19 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     hide_heat_map(obj, chain)
     notes = shape_keys.remove_keys(obj, list(chain_keys.owned_keys(keys_of(obj), chain).values()))
     notes += remove_slider(control, chain)
-    with ExitStack() as undo:  # last: for as long as the chain is known it can be removed
+    with ExitStack() as undo:  # last, so that a chain whose removal was interrupted can be removed again
         bookkeeping.forget(keys_of(obj), record, chain, undo)
         undo.pop_all()
     return notes
 
 
 def remove_slider(control: Control, chain: Chain) -> list[str]:
-    """Remove the slider of a chain, with the keyframes that a bake gave it; a sentence where something needs it."""
+    """Remove the slider of a chain, with the keyframes of a bake; a sentence for whatever stays."""
     owner = control.owner
     if control.is_key or not control.is_there:  # a key is the user's own
         return []
     if not control.is_number:
-        return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is not a number any more."]
+        return [f"The custom property '{chain.slider}' of '{owner.name}' stays, since it is no longer a number."]
     readers = sum(1 for curve in drivers.all_drivers() if drivers.reads(curve.driver, control))
     if readers:
         what = "driver reads" if readers == 1 else "drivers read"

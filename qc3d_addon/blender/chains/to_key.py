@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a slider of their own to the key itself: the same in-betweens, played by the value of the last key."""
+"""Changes the control of in-betweens from a slider to the value of the last key."""
 
 from __future__ import annotations
 
@@ -19,31 +19,34 @@ from . import remove
 
 
 def problem(obj: bpy.types.Object, chain: Chain) -> str | None:
-    """Why the last key's value cannot play the in-betweens of a slider, or None. Quick enough for a panel."""
+    """Why the last key's value cannot play the in-betweens of a slider, or None. Fast enough for a panel."""
     keys = keys_of(obj)
     if chain.on_key:
-        return f"The value of '{chain.on_key}' plays them already."
+        return f"The value of '{chain.on_key}' already plays them."
     return checks.chain_problem(keys, chain) or checks.control_problem(keys, chain.through, chain.through[0])
 
 
 def play_on_key(obj: bpy.types.Object, record: Record, chain: Chain) -> tuple[Chain, list[str]]:
-    """Let the value of the last key play the in-betweens of a slider, as they are, in place of the slider.
+    """Play the in-betweens of a slider by the value of the last key instead; the shapes stay the same.
 
     Returns
     -------
-    The new chain, and sentences about what was left because the animator's own work depends on it.
+    chain : Chain
+        The new chain.
+    notes : list of str
+        Sentences about what stays because the user's own work depends on it.
 
     Raises
     ------
     InputError
-        If the key cannot play them, plays others already, or something cannot be changed; nothing was changed.
+        If the key cannot play them or already plays others, or something cannot be changed; nothing is changed then.
     """
     found = problem(obj, chain)
     if found is not None:
         raise InputError(found)
     keys, name = keys_of(obj), chain.through[-1]
     if record.chain_on_key(name) is not None:
-        raise InputError(f"'{name}' plays in-betweens of its own already; remove those or these.")
+        raise InputError(f"'{name}' already plays other in-betweens; remove those or these.")
     shape_keys.require_removable(obj, chain)
     shapes = chain_shapes.offsets_by_step(obj, chain.places, chain_shapes.step_shapes(obj, chain))
     label = names.chain_label((name,), {*obj.keys(), *(other.slider for other in record.chains)})

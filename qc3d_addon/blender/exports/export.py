@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object with its in-betweens written for other programs: by Blender's own exporter, then in-betweens put in."""
+"""Exports an object with its in-betweens: Blender's own exporter writes the file, then in-betweens are added."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from ..store.records import Chain, Record
 from . import fbx_files, gltf_files, usd_files
 from .in_betweens import InBetweens
 
-# Readers of USD and FBX go straight from one in-between to the next.
+# In-betweens per key in USD and FBX. Programs that read them interpolate linearly, and with so many, straight lines
+# miss a rotation by 90 degrees by 0.2 % of the radius.
 DENSITY = 12
-# What glTF's viewers and engines take of one key without trouble.
+# The specification asks glTF viewers to support only eight morphed attributes (glTF 2.0, section 3.7.2.2).
 _MOST_TARGETS = 8
 _MOST_EVALUATIONS = 10
 SUFFIXES = (".usda", ".usdc", ".usd", ".fbx", ".glb")
@@ -33,31 +34,33 @@ SUFFIXES = (".usda", ".usdc", ".usd", ".fbx", ".glb")
 def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> list[str]:
     """Write an object with its shape keys and their in-betweens, and the animation over the scene's frames.
 
-    The object and the scene are as they were afterwards, whatever happens. Armatures that deform the object, and what
-    it is a child of, are written with it.
+    The object and the scene are unchanged afterward, whatever happens. The parents of the object and the armatures
+    that deform it are exported too.
 
     Parameters
     ----------
     obj
+        A mesh object with in-betweens that are played by the values of keys.
     path
-        Its ending says the format: .usda, .usdc or .usd, .fbx, .glb.
+        The file; its extension chooses the format: .usda, .usdc or .usd, .fbx, .glb.
     density
-        How many in-betweens of each key USD and FBX get, computed from what its control plays.
+        Number of in-betweens per key in USD and FBX, computed from what the key plays.
 
     Returns
     -------
-    Sentences for the user.
+    list of str
+        Sentences for the user.
 
     Raises
     ------
     InputError
-        If the object has no in-betweens, the ending is another one, or the file cannot be written.
+        If the object has no in-betweens, the extension is unknown, or the file cannot be written.
     """
     obj = checks.require_object(obj)
     chains = _chains(obj)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"{path.name} ends in none of {', '.join(SUFFIXES)}; choose one of these formats.")
+        raise InputError(f"{path.name} has none of the extensions {', '.join(SUFFIXES)}; choose one of them.")
     require_writable(path)
     names = [key.name for key in keys_of(obj).key_blocks[1:]]
     # Beside its place: exporters write the paths of images relative to the file's own folder.
@@ -96,7 +99,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
 
 
 def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens:
-    """So many evenly spaced shapes that a key plays between 0 and 1, in-betweens sculpted since included.
+    """``density`` evenly spaced shapes that a key plays between 0 and 1, including what was sculpted since.
 
     Raises
     ------
@@ -111,11 +114,11 @@ def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens
 
 
 def _chains(obj: bpy.types.Object) -> list[Chain]:
-    """The in-betweens that the object's keys play by their own values."""
+    """The chains that keys of the object play by their own values."""
     chains = [chain for chain in Record.read(keys_of(obj)).chains if chain.on_key]
     if not chains:
         raise InputError(
-            f"'{obj.name}' has no in-betweens on a key's own value, which is where other programs have them; bake some "
+            f"'{obj.name}' has no in-betweens that a key plays by its own value, as other programs need; bake some "
             "with Play On set to Key."
         )
     return chains
@@ -124,7 +127,7 @@ def _chains(obj: bpy.types.Object) -> list[Chain]:
 def _export_gltf(
     obj: bpy.types.Object, chains: list[Chain], unfinished: Path, path: Path, size: int
 ) -> list[str]:
-    """Targets as they are in Blender, their weights written down at every frame."""
+    """Export the keys as morph targets with their weights at every frame."""
     _called(
         lambda: bpy.ops.export_scene.gltf(filepath=str(unfinished), export_format='GLB', use_selection=True),
         unfinished,
@@ -137,15 +140,15 @@ def _export_gltf(
     seconds = frames * (render.fps_base / render.fps)
     gltf_files.set_weight_animation(unfinished, obj.name, names, seconds, values)
     return [
-        f"'{chain.on_key}' has {len(chain.keys)} in-betweens, and engines take {_MOST_TARGETS} without trouble; "
-        "re-bake it with fewer."
+        f"'{chain.on_key}' has {len(chain.keys)} in-betweens; some programs support only {_MOST_TARGETS} morph "
+        "targets, so re-bake it with fewer."
         for chain in chains
         if len(chain.keys) > _MOST_TARGETS
     ]
 
 
 def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The scene's frames (f,), and the values (f, k) that the object's shape keys have there."""
+    """The scene's frames (f,), and the values (f, k) of the object's shape keys at them."""
     scene = present(bpy.context.scene)
     before = scene.frame_current, scene.frame_subframe
     frames = range(scene.frame_start, scene.frame_end + 1)
@@ -160,10 +163,10 @@ def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArr
 
 
 def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
-    """(k,) the values of the object's shape keys now.
+    """(k,) the present values of the object's shape keys.
 
-    Blender's threads now and then evaluate a driver before the one that it reads, one time in a thousand on a machine
-    with much to do: two evaluations that agree are right.
+    Where drivers of the user move other things of the keys than their values, Blender's threads may write values of the
+    frame before back, one time in a thousand on a machine with much to do: two evaluations that agree are right.
     """
     found = _values(obj)
     for _ in range(_MOST_EVALUATIONS):
@@ -182,7 +185,7 @@ def _values(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 @contextmanager
 def _alone(obj: bpy.types.Object) -> Iterator[None]:
-    """Let the object be selected, with what it is a child of and the armatures that deform it, and nothing else."""
+    """Select only the object, its parents and the armatures that deform it while the block runs."""
     layer = present(bpy.context.view_layer)
     together = {obj}
     for modifier in obj.modifiers:
@@ -195,7 +198,7 @@ def _alone(obj: bpy.types.Object) -> Iterator[None]:
     selected, active = set(present(bpy.context.selected_objects)), layer.objects.active
     hidden = [one for one in together if one.name not in layer.objects]
     if hidden:
-        raise InputError(f"'{hidden[0].name}' is not in this view layer; switch its collection on first.")
+        raise InputError(f"'{hidden[0].name}' is not in this view layer; enable its collection first.")
     try:
         _select(layer, together, obj)
         yield
@@ -215,15 +218,15 @@ def _called(exporter: Callable[[], object], unfinished: Path, path: Path, size: 
     Raises
     ------
     InputError
-        If it is not there or fails.
+        If the exporter is disabled or fails.
     """
     try:
         result = exporter()
     except AttributeError as error:
-        raise InputError(f"Blender's exporter for {path.suffix} is switched off; enable its add-on first.") from error
+        raise InputError(f"Blender's exporter for {path.suffix} is disabled; enable its add-on first.") from error
     except RuntimeError as error:
         words = native_files.words(error, unfinished, path)
-        require_room(path, size)  # exporters call a full disk anything
+        require_room(path, size)  # on a full disk, exporters report all kinds of errors
         raise InputError(f"{path} cannot be written: {words}.") from error
     if result != {'FINISHED'} or not unfinished.exists():
         require_room(path, size)

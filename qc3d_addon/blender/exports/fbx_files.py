@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens in FBX files: one blend-shape channel with its shapes in the order of their full weights.
+"""In-betweens in FBX files: a blend-shape channel with several target shapes, ordered by their full weights.
 
-Blender's exporter writes one channel for each shape key. Its own reader and writer of FBX's tree of elements put the
-shapes of in-betweens into the channel of their key, and take the channels out that play them in Blender.
+Blender's exporter writes one channel per shape key. With the parser and the encoder of Blender's FBX add-on, this
+module adds the in-betweens to the channel of their key and removes the channels of the keys that play them in Blender.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError, reason
 from .in_betweens import InBetweens
 
-# What ends a name, before the kind of what has it.
+# Separates the name of an element from its class.
 _CLASS = b"\x00\x01"
 _CREATOR = b"QC3D, on Blender's FBX exporter"
-# How FBX's types of properties are added.
+# Names of the encoder's methods, by the type codes of FBX properties.
 _ADDED_BY = {
     "Y": "int16", "Z": "int8", "B": "bool", "C": "char", "I": "int32", "F": "float32", "D": "float64", "L": "int64",
     "R": "bytes", "S": "string", "f": "float32_array", "i": "int32_array", "d": "float64_array", "l": "int64_array",
@@ -36,23 +36,25 @@ def add_in_betweens(path: Path, data_name: str, found: Sequence[InBetweens]) -> 
     Parameters
     ----------
     path : Path
+        The file, which is replaced.
     data_name : str
-        Name of the mesh's data.
+        Name of the mesh data block.
     found : sequence of InBetweens
+        The in-betweens of each key.
 
     Raises
     ------
     InputError
-        If the file cannot be read or written, or has no such channel.
+        If the file cannot be read or written, or has no channel for a key.
     """
     try:
         from io_scene_fbx import encode_bin, parse_fbx
     except ImportError as error:
-        raise InputError("Blender's FBX add-on is switched off; enable it in the preferences.") from error
+        raise InputError("Blender's FBX add-on is disabled; enable it in the preferences.") from error
     try:
         parsed, version = parse_fbx.parse(str(path))
     except (OSError, ValueError) as error:
-        raise InputError(f"{path} is no FBX file that can be read: {reason(error)}; export it again.") from error
+        raise InputError(f"{path} cannot be read as an FBX file: {reason(error)}; export it again.") from error
     file = _File(_plain(parsed), data_name)
     for key in found:
         file.add(key)
@@ -63,7 +65,7 @@ def add_in_betweens(path: Path, data_name: str, found: Sequence[InBetweens]) -> 
 
 
 class _Element:
-    """An element of the tree: its name, properties with their types, and what is in it."""
+    """An element of the file's tree: its name, its properties with their type codes, and its children."""
 
     def __init__(self, name: bytes, values: Sequence[Any], types: str, inside: Sequence[_Element] = ()) -> None:
         self.name, self.values, self.types, self.inside = name, list(values), types, list(inside)
@@ -76,7 +78,7 @@ class _Element:
 
 
 class _File:
-    """The tree of a file, and in it the channels of one mesh."""
+    """The tree of a file, with the channels of one mesh."""
 
     def __init__(self, root: _Element, data_name: str) -> None:
         self.root = root
@@ -94,7 +96,7 @@ class _File:
         self._free = 1 + max(int(element.values[0]) for element in self._objects.inside)
 
     def add(self, key: InBetweens) -> None:
-        """Put shapes before the one of the key's channel, and their weights before its own."""
+        """Insert the in-betweens before the target shape of the key's channel, and their full weights before its."""
         channel = self._named(b"Deformer", key.key, b"BlendShapeChannel", self._channels)
         at = next(
             number
@@ -112,7 +114,7 @@ class _File:
 
     def _shape(self, name: str, offsets: NDArray[np.float64]) -> _Element:
         moved = np.flatnonzero((offsets != 0.0).any(axis=1))
-        moved = moved if len(moved) else np.zeros(1, dtype=np.int64)  # a shape without any points is refused by readers
+        moved = moved if len(moved) else np.zeros(1, dtype=np.int64)  # programs refuse a shape without any points
         vectors = array.array("d", offsets[moved].ravel())
         inside = [
             _Element(b"Properties70", [], ""),
@@ -124,7 +126,7 @@ class _File:
         return _Element(b"Geometry", [self._free, name.encode() + _CLASS + b"Geometry", b"Shape"], "LSS", inside)
 
     def remove(self, names: frozenset[str]) -> None:
-        """Take out the channels of keys, their shapes, and what animates them."""
+        """Remove the channels of keys, their shapes, and their animation."""
         encoded = {name.encode() for name in names}
         gone = {element.values[0] for element in self._channels if _name(element) in encoded}
         gone |= {link.values[1] for link in self._links.inside if link.values[2] in gone}
@@ -141,8 +143,8 @@ class _File:
         self._mesh_properties.inside = kept
 
     def count(self) -> None:
-        """Bring up to date how many there are of each kind."""
-        total = 1  # the global settings, which are no object
+        """Update the number of elements of each type in the Definitions."""
+        total = 1  # the global settings, which are not among the objects
         for kind in self.root.child(b"Definitions").inside:
             if kind.name == b"ObjectType" and kind.values[0] != b"GlobalSettings":
                 number = sum(element.name == kind.values[0] for element in self._objects.inside)
@@ -151,7 +153,7 @@ class _File:
         self.root.child(b"Definitions").child(b"Count").values = [total]
 
     def sign(self) -> None:
-        """Say who wrote the file: readers that see Blender's name take full weights for those of vertices."""
+        """Set the creator: some programs read full weights of files by Blender as weights of vertices."""
         header = self.root.child(b"FBXHeaderExtension")
         for element in (self.root.child(b"Creator"), header.child(b"Creator")):
             element.values = [_CREATOR]

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens in glTF files: separate targets, and what the rig plays of them written down frame by frame.
+"""In-betweens in glTF files: morph targets whose weights are animated with a value at every frame.
 
-glTF blends its targets by weights alone, which no driver moves, and by default Blender exports no animation of keys
-that drivers play. The values of all keys at every frame make the motion the same there.
+glTF has no drivers, and by default Blender exports no animation of driven keys. Therefore the values of all keys are
+sampled at every frame, so that the motion is the same.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _FLOAT = 5126
 def set_weight_animation(
     path: Path, node: str, names: Sequence[str], seconds: NDArray[np.float64], values: NDArray[np.float64]
 ) -> None:
-    """Write down the weights of a mesh's targets over time, in place of those that are there.
+    """Replace the animation of a mesh's morph-target weights.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def set_weight_animation(
     node : str
         Name of the object.
     names : sequence of str
-        Of the shape keys that ``values`` are of.
+        Names of the shape keys, in the order of the columns of ``values``.
     seconds : (f,)
         Times, increasing.
     values : (f, k)
@@ -52,7 +52,7 @@ def set_weight_animation(
     column = {name: index for index, name in enumerate(names)}
     missing = [name for name in targets if name not in column]
     if missing:
-        raise InputError(f"{path.name} has a target '{missing[0]}' that is none of the shape keys; export it again.")
+        raise InputError(f"{path.name} has a target '{missing[0]}' that is not a shape key; export it again.")
     weights = values[:, [column[name] for name in targets]]
     _drop_weights(document, number)
     data = bytearray(binary)
@@ -72,7 +72,7 @@ def set_weight_animation(
 def _accessor(
     document: dict[str, Any], data: bytearray, numbers: NDArray[np.float64], with_range: bool = False
 ) -> int:
-    """Number of a new accessor of single-precision numbers (f,), which are added to the file's data."""
+    """Index of a new accessor of single-precision numbers (f,), which are appended to the binary data."""
     data.extend(bytes(-len(data) % 4))
     packed = numbers.astype("<f4")
     view = {"buffer": 0, "byteOffset": len(data), "byteLength": packed.nbytes}
@@ -91,7 +91,7 @@ def _accessor(
 
 
 def _drop_weights(document: dict[str, Any], node: int) -> None:
-    """Take out the channels that move a node's weights, and animations that then move nothing."""
+    """Remove the channels that animate a node's weights, and animations that become empty."""
     kept = []
     for animation in document.get("animations", []):
         animation["channels"] = [
@@ -105,13 +105,13 @@ def _drop_weights(document: dict[str, Any], node: int) -> None:
 
 
 def _node(document: dict[str, Any], name: str, path: Path) -> tuple[int, list[str]]:
-    """Number of the node of that name, and the names of its mesh's targets."""
+    """Index of the node of that name, and the names of its mesh's targets."""
     for number, node in enumerate(document.get("nodes", [])):
         if node.get("name") == name and "mesh" in node:
             targets = document["meshes"][node["mesh"]].get("extras", {}).get("targetNames", [])
             if targets:
                 return number, list(targets)
-    raise InputError(f"{path.name} has no object '{name}' with shapes; take its modifiers off, or export it again.")
+    raise InputError(f"{path.name} has no object '{name}' with shapes; remove its modifiers, or export it again.")
 
 
 def _read(path: Path) -> tuple[dict[str, Any], bytes]:
@@ -125,9 +125,9 @@ def _read(path: Path) -> tuple[dict[str, Any], bytes]:
         binary_size, binary_kind = _CHUNK.unpack_from(data, after)
         binary = data[after + _CHUNK.size : after + _CHUNK.size + binary_size]
     except (struct.error, ValueError) as error:
-        raise InputError(f"{path} is no binary glTF file: {reason(error)}; choose a name that ends in .glb.") from error
+        raise InputError(f"{path} is not a binary glTF file: {reason(error)}; choose a name ending in .glb.") from error
     if (magic, version, length, kind, binary_kind) != (_MAGIC, _VERSION, len(data), _JSON, _BINARY):
-        raise InputError(f"{path} is no binary glTF file of version 2; choose a name that ends in .glb.")
+        raise InputError(f"{path} is not a binary glTF file of version 2; choose a name ending in .glb.")
     return document, binary
 
 

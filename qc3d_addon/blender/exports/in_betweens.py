@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What other programs are told of a key's in-betweens: shapes at values of the key."""
+"""The in-betweens of a key for other programs: shapes at values of the key."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class InBetweens(NamedTuple):
     key : str
         Name of the key.
     made : frozenset of str
-        Names of the keys that play its in-betweens in Blender; elsewhere the shapes below take their place.
+        Names of the keys that play its in-betweens in Blender; in other programs the shapes below replace them.
     places : (p,)
-        Values of the key, between 0 and 1, increasing.
+        Values of the key, increasing, in (0, 1).
     offsets : (p, n, 3)
-        What the key shows there, from what it is relative to, in the object's own units.
+        Offsets of the vertices from the key's base at these values, in the object's own units.
     """
 
     key: str

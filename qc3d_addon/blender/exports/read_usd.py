@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys from a USD file's in-betweens, which Blender's importer drops: at their weights, played as USD has it."""
+"""Reads the in-betweens of a USD file, which Blender's importer drops, as in-betweens of shape keys."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ from . import usd_files
 
 
 def read_in_betweens(obj: bpy.types.Object | None, path: Path) -> list[str]:
-    """Give keys of an object the in-betweens that blend shapes of their names have in a USD file.
+    """Give keys of an object the in-betweens of the blend shapes of the same names in a USD file.
 
-    The keys themselves stay as they are; between them the control goes straight from in-between to in-between, as USD
-    has it. Keys that have in-betweens already are left alone.
+    The keys themselves stay as they are. In-betweens are interpolated linearly, as in USD. Keys that already have
+    in-betweens are skipped.
 
     Returns
     -------
-    Sentences for the user, the last of them what was done.
+    list of str
+        Sentences for the user, the last of which says what was done.
 
     Raises
     ------
     InputError
-        If the object or the file cannot be used, or nothing in the file belongs to a key; nothing has changed.
+        If the object or the file cannot be used, or nothing in the file belongs to a key; nothing is changed then.
     """
     obj = checks.require_object(obj)
     require_file(path)
@@ -46,9 +47,9 @@ def read_in_betweens(obj: bpy.types.Object | None, path: Path) -> list[str]:
     for shape in found:
         key = by_token.get(usd_files.safe_name(shape.name))
         if key is None:
-            notes.append(f"There is no shape key for the file's '{shape.name}'; import the file with Blender first.")
+            notes.append(f"There is no shape key for '{shape.name}' of the file; import the file with Blender first.")
         elif record.chain_on_key(key.name) is not None:
-            notes.append(f"'{key.name}' has in-betweens already; remove them to read the file's.")
+            notes.append(f"'{key.name}' already has in-betweens; remove them to read those of the file.")
         else:
             _write(obj, record, key, shape)
             done.append(f"'{key.name}'")
@@ -61,7 +62,7 @@ def _write(obj: bpy.types.Object, record: Record, key: bpy.types.ShapeKey, shape
     base = key.relative_key
     places = (0.0, *shape.places.tolist(), 1.0)
     first = key_coordinates(obj, base.name).astype(np.float64)
-    # The key is what it is in this file; in-betweens are the other file's.
+    # The last frame is the key of the object itself, not that of the file.
     frames = np.concatenate([first[None], first + shape.offsets[:-1], key_coordinates(obj, key.name)[None]])
     taken = {*obj.keys(), *(other.slider for other in record.chains)}
     chain = Chain((base.name, key.name), chain_label((key.name,), taken), on_key=key.name)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens in USD files: written into what Blender exports, read where Blender drops them.
+"""In-betweens in USD files, which Blender neither exports nor imports.
 
-They are attributes ``inbetweens:NAME`` with a weight, beside the offsets of their blend shape, and readers go straight
-from one to the next (UsdSkel, *Inbetweens*).
+They are attributes ``inbetweens:NAME`` of a blend shape, each with a weight, and are interpolated linearly (UsdSkel,
+*Inbetweens*).
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ class ReadShape(NamedTuple):
     Parameters
     ----------
     name : str
+        Name of the blend shape.
     places : (p,)
-        Weights of its in-betweens, between 0 and 1, increasing.
+        Weights of its in-betweens, increasing, in (0, 1).
     offsets : (p + 1, n, 3)
-        Of the in-betweens, and of the shape itself.
+        Offsets of the in-betweens and, last, of the shape itself.
     """
 
     name: str
@@ -48,11 +49,13 @@ def add_in_betweens(path: Path, names: Sequence[str], vertices: int, found: Sequ
     Parameters
     ----------
     path : Path
+        The file, which is replaced.
     names : sequence of str
-        Of all shape keys of the exported mesh but the first, in their order.
+        Names of all shape keys of the exported mesh except the first, in their order.
     vertices : int
-        Of the mesh.
+        Number of vertices of the mesh.
     found : sequence of InBetweens
+        The in-betweens of each key.
 
     Raises
     ------
@@ -82,22 +85,22 @@ def add_in_betweens(path: Path, names: Sequence[str], vertices: int, found: Sequ
             _leave_out(skel.Animation(prim), gone)
     try:
         is_saved = stage.GetRootLayer().Save()
-    except Exception as error:  # pxr's own kind
+    except Exception as error:  # an exception type of pxr
         raise InputError(f"{path.name} cannot be written: {reason(error)}; choose another place.") from error
     if not is_saved:
         raise InputError(f"{path.name} cannot be written; choose another place.")
 
 
 def read_in_betweens(path: Path, vertices: int) -> list[ReadShape]:
-    """Blend shapes that have in-betweens, of the meshes in a file that have so many vertices.
+    """Blend shapes with in-betweens of the only mesh in a file that has this number of vertices.
 
     Raises
     ------
     InputError
-        If the file cannot be read, has no such mesh, or two, or what it holds makes no sense.
+        If the file cannot be read, has none or several such meshes, or has invalid data.
     """
     usd, skel = _pxr("Usd"), _pxr("UsdSkel")
-    stage = _opened(usd, path)  # what is in it lives no longer than this
+    stage = _opened(usd, path)  # prims are valid only as long as this variable
     meshes = [
         prim
         for prim in _meshes(stage)
@@ -105,14 +108,16 @@ def read_in_betweens(path: Path, vertices: int) -> list[ReadShape]:
     ]
     if len(meshes) != 1:
         many = "no mesh" if not meshes else f"{len(meshes)} meshes"
-        raise InputError(f"{path.name} has {many} of {vertices} vertices with blend shapes; choose the mesh it is of.")
+        raise InputError(
+            f"{path.name} has {many} of {vertices} vertices with blend shapes; select the mesh that it was made for."
+        )
     tokens, prims = _bound(skel, meshes[0])
     shapes = [_read_shape(skel.BlendShape(prim), name, vertices) for name, prim in zip(tokens, prims, strict=True)]
     return [shape for shape in shapes if len(shape.places)]
 
 
 def _write_shape(shape: Any, key: InBetweens) -> None:  # noqa: ANN401 - of pxr, which has no types
-    """Put in-betweens beside the offsets of a blend shape: for the same points, or for all where one is missing."""
+    """Add in-betweens to a blend shape: for its points, or for all points if an in-between moves others too."""
     indices = np.array(shape.GetPointIndicesAttr().Get() or (), dtype=np.int64)
     if len(indices):
         moved = np.flatnonzero((key.offsets != 0.0).any(axis=(0, 2)))
@@ -129,18 +134,18 @@ def _write_shape(shape: Any, key: InBetweens) -> None:  # noqa: ANN401 - of pxr,
 
 
 def safe_name(name: str) -> str:
-    """A name as USD allows it, which is what Blender makes of names of shape keys."""
+    """The valid USD name that Blender gives to a shape key of this name."""
     safe = "".join(mark if mark.isascii() and mark.isalnum() else "_" for mark in name)
     return f"_{safe}" if safe[:1].isdigit() else safe
 
 
 def _token(name: str, place: float) -> str:
-    """A name for an in-between, with its place in it as riggers write it."""
+    """The name of an in-between, with its place in percent, as riggers write it."""
     return f"{safe_name(name)}_{format(100.0 * place, '.4g').replace('.', '_')}"
 
 
 def _leave_out(animation: Any, gone: set[str]) -> None:  # noqa: ANN401
-    """Take blend shapes out of an animation, from all its moments."""
+    """Remove blend shapes from an animation, at all its time samples."""
     names = list(animation.GetBlendShapesAttr().Get() or ())
     kept = [number for number, name in enumerate(names) if name not in gone]
     if len(kept) == len(names):
@@ -170,7 +175,7 @@ def _dense(values: object, indices: NDArray[np.int64], vertices: int, name: str)
     offsets = np.array([] if values is None else values, dtype=np.float64).reshape(-1, 3)
     in_range = not len(indices) or (indices.min() >= 0 and indices.max() < vertices)
     if len(offsets) != len(indices) or not in_range or not np.isfinite(offsets).all():
-        raise InputError(f"The blend shape '{name}' does not belong to its mesh; export the file again.")
+        raise InputError(f"The blend shape '{name}' does not match its mesh; export the file again.")
     dense = np.zeros((vertices, 3))
     dense[indices] = offsets
     return dense
@@ -202,8 +207,8 @@ def _vectors(values: NDArray[np.float64] | NDArray[np.float32]) -> Any:  # noqa:
 def _opened(usd: ModuleType, path: Path) -> Any:  # noqa: ANN401
     try:
         return usd.Stage.Open(str(path), usd.Stage.LoadAll)
-    except Exception as error:  # pxr's own kind, which every version calls another name
-        raise InputError(f"{path} is no USD file that can be read: {reason(error)}; export it again.") from error
+    except Exception as error:  # an exception type of pxr, which has another name in every version
+        raise InputError(f"{path} cannot be read as a USD file: {reason(error)}; export it again.") from error
 
 
 def _pxr(module: str) -> ModuleType:
@@ -212,14 +217,14 @@ def _pxr(module: str) -> ModuleType:
         return importlib.import_module(f"pxr.{module}")
     except ModuleNotFoundError:
         pass
-    # Blender as a Python module has it in a folder of its own, which nothing is imported from.
+    # The bpy module has it in a folder that is not on Python's path.
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     # The stubs do not know this function of Blender's.
     of_blender: Callable[[str], str] = vars(bpy.utils)["system_resource"]
     folder = Path(of_blender('PYTHON'), "lib", version, "site-packages")
     spec = PathFinder.find_spec("pxr", [str(folder)])
     if spec is None or spec.loader is None:
-        raise InputError("This Blender comes without USD's Python package; choose FBX, or another Blender.")
+        raise InputError("This Blender has no Python package of USD; export FBX, or use another Blender.")
     package = importlib.util.module_from_spec(spec)
     sys.modules["pxr"] = package
     spec.loader.exec_module(package)

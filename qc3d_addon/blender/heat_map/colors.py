@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of the heat map and the range of values that they stand for."""
+"""Colors of the heat map and the range of values that they stand for."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 Colour = tuple[float, float, float]
 
-# Blue, grey and red can be told apart by nearly everyone; both arms are equally dark. Sampled from hues of equal steps
-# in lightness (see Moreland 2009, "Diverging color maps for scientific visualization").
+# A diverging map from blue through gray to red, which color-blind people can tell apart too; both arms have equal steps
+# in lightness (Moreland 2009, "Diverging color maps for scientific visualization").
 _DIVERGING: tuple[Colour, ...] = (
     (0.13, 0.31, 0.65), (0.42, 0.62, 0.85), (0.87, 0.87, 0.87), (0.90, 0.57, 0.45), (0.70, 0.10, 0.16),
 )  # fmt: skip
-# From grey through orange to dark red.
+# From gray through orange to dark red.
 _SEQUENTIAL: tuple[Colour, ...] = (
     (0.87, 0.87, 0.87), (0.95, 0.78, 0.52), (0.90, 0.52, 0.30), (0.75, 0.25, 0.25), (0.45, 0.05, 0.25),
 )  # fmt: skip
@@ -28,13 +28,13 @@ MEASURE_ITEMS = (
     ("dilatation", "Dilatation", "How unevenly space around a vertex is stretched: longest over shortest axis"),
 )
 
-# Ends of the scale that read well; the first that holds nearly all values is taken.
+# Round numbers for the ends of the scale; the smallest that covers ``_HELD`` percent of the values is used.
 _ENDS = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
 _HELD = 95.0  # percent of the vertices, in the frame that is distorted most
 
 
 class Scale(NamedTuple):
-    """What the colours of a measure stand for, from ``low`` to ``high``, evenly in the logarithm."""
+    """The values that the colors of a measure stand for, from ``low`` to ``high``, on a logarithmic scale."""
 
     title: str
     low: float
@@ -43,7 +43,7 @@ class Scale(NamedTuple):
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Places along the scale, 0..1, and the values there."""
+        """Positions along the scale, in [0, 1], and the values there as text."""
         values = (self.low, 1.0, self.high) if self.low < 1.0 else (1.0, self.high**0.5, self.high)
         return [(place, f"{value:.3g}") for place, value in zip((0.0, 0.5, 1.0), values, strict=True)]
 
@@ -56,14 +56,14 @@ _TITLES = {
 
 
 def scale_of(measure: str, values: NDArray[np.float32]) -> Scale:
-    """The scale that shows the values (k, n) of a measure."""
+    """The scale for the values (k, n) of a measure."""
     away = np.percentile(np.abs(np.log(np.maximum(values, 1e-6))), _HELD, axis=1).max()
     end = next((end for end in _ENDS if np.log(end) >= away), _ENDS[-1])
     return _scale(measure, end)
 
 
 def scale_between(measure: str, low: float, high: float) -> Scale:
-    """The scale of a measure with these ends; raises ValueError or KeyError where ``scale_of`` makes none like it."""
+    """The scale of a measure with these ends; raises ValueError or KeyError if ``scale_of`` cannot have made it."""
     if high not in _ENDS or _scale(measure, high).low != low:
         raise ValueError("no ends of a scale")
     return _scale(measure, high)
@@ -76,7 +76,7 @@ def _scale(measure: str, end: float) -> Scale:
 
 
 def linear(colour: Colour) -> Colour:
-    """A colour of the screen (sRGB) as Blender's attributes hold it."""
+    """An sRGB color in the linear color space of Blender's attributes."""
     red, green, blue = (
         value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour
     )

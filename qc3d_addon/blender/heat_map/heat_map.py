@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map of a chain: attributes of each step, and a modifier that blends them as the slider does.
+"""The heat map of a chain: attributes for each step, and a modifier that interpolates them like the slider.
 
-The mesh gets a float attribute for each measure and step, "QC3D stretch 2" for the second step. The modifier's nodes
-write what holds at the slider's position into "QC3D stretch", "QC3D volume" and "QC3D dilatation", which any material
-can read, and the colours of one of them into the colour attribute "QC3D Heat Map", which the viewport shows. Nothing
-of it needs the add-on: it is saved, played and rendered without.
+The mesh gets a float attribute for each measure and step, such as "QC3D stretch 2" for the second step. The modifier's
+nodes write the values at the slider's position into "QC3D stretch", "QC3D volume" and "QC3D dilatation", which any
+material can read, and the colors of one of them into the color attribute "QC3D Heat Map", which the viewport shows.
+The heat map can be saved, played and rendered without the add-on.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from .colors import Scale, linear, scale_between, scale_of
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import NodeMathItems
 
-NAME = "QC3D Heat Map"  # of the modifier, its nodes and the colour attribute
+NAME = "QC3D Heat Map"  # of the modifier, its nodes and the color attribute
 _STATE = "qc3d_heat_map"
 
 
 class Shown(NamedTuple):
-    """What a heat map shows."""
+    """The contents of a shown heat map."""
 
     slider: str
     measure: str
@@ -47,7 +47,7 @@ class Shown(NamedTuple):
 
 
 def shown(obj: bpy.types.Object | None) -> Shown | None:
-    """What an object's heat map shows, None where there is none. Quick enough for a panel."""
+    """What an object's heat map shows; None without one. Fast enough for a panel."""
     if obj is None or obj.type != 'MESH' or _modifier(obj) is None:
         return None
     state = _state(obj)
@@ -60,12 +60,12 @@ def shown(obj: bpy.types.Object | None) -> Shown | None:
 
 
 def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
-    """Put the heat map of one measure on the object, in place of another one; where that fails, nothing is changed.
+    """Show the heat map of one measure on the object, instead of any other; if that fails, nothing is changed.
 
     Raises
     ------
     InputError
-        If the bake's measures are not kept or belong to another mesh, or the slider cannot play anything.
+        If the measures of the bake are not stored or belong to another mesh, or the slider is not a number.
     """
     mesh = mesh_of(obj)
     measures = kept_measures.read(keys_of(obj), chain.slider, len(mesh.vertices))
@@ -74,7 +74,7 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
     control = control_of(obj, chain)
     control.require()
     if NAME in obj.modifiers and _modifier(obj) is None:
-        raise InputError(f"'{obj.name}' has another modifier of the name '{NAME}'; rename that first.")
+        raise InputError(f"'{obj.name}' has another modifier named '{NAME}'; rename that first.")
     scale = scale_of(measure, measures[measure])
     by_step = {f"QC3D {name} {step}": of_all[step] for name, of_all in measures.items() for step in range(len(of_all))}
     colour = _active_colour(mesh)
@@ -106,7 +106,7 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
 
 
 def refresh(obj: bpy.types.Object, chain: Chain) -> None:
-    """Show what a new bake of the chain measured, where the heat map of that chain is shown."""
+    """Update the heat map after a new bake of the chain, if the heat map of that chain is shown."""
     state = shown(obj)
     if state is None or state.slider != chain.slider:
         return
@@ -121,7 +121,7 @@ def hide(obj: bpy.types.Object) -> None:
     before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
     _set_attributes(mesh_of(obj), None)
     _set_active_colour(mesh_of(obj), before)
-    if modifier is not None:  # last: for as long as it is there, the heat map is known and can be hidden
+    if modifier is not None:  # last, so that an interrupted removal can be repeated
         tree = modifier.node_group
         obj.modifiers.remove(modifier)
         if tree is not None and tree.users == 0:
@@ -135,7 +135,7 @@ def _modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def _state(obj: bpy.types.Object) -> dict[str, Any]:
-    """What ``show`` kept with the object; empty where there is nothing or something else."""
+    """The state that ``show`` stored with the object; empty if there is none or it is invalid."""
     try:
         return stored.parse(obj.get(_STATE))
     except ValueError:
@@ -147,13 +147,13 @@ def _active_colour(mesh: bpy.types.Mesh) -> str:
 
 
 def _set_active_colour(mesh: bpy.types.Mesh, name: object) -> None:
-    """Let the viewport show this colour attribute, where there is one of that name."""
+    """Let the viewport show the color attribute of this name, if there is one."""
     if isinstance(name, str) and name in mesh.color_attributes.keys():  # noqa: SIM118 - fails on half a surrogate pair
         mesh.color_attributes.active_color_name = name
 
 
 def _attributes(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.float32]] | None:
-    """Values (n,) of the heat map's attributes by name; None where there are none, not even for its colours."""
+    """Values (n,) of the heat map's attributes by name; None if the mesh has no attribute of the heat map."""
     found = {}
     for attribute in mesh.attributes:
         if _is_ours(attribute.name) and attribute.name != NAME and isinstance(attribute, bpy.types.FloatAttribute):
@@ -163,7 +163,7 @@ def _attributes(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.float32]] | None:
 
 
 def _set_attributes(mesh: bpy.types.Mesh, values: dict[str, NDArray[np.float32]] | None) -> None:
-    """Give the mesh the heat map's attributes with these values (n,), and the one for its colours; None takes all."""
+    """Replace the heat map's attributes by ones with these values (n,) and one for its colors; None removes all."""
     for name in [attribute.name for attribute in mesh.attributes if _is_ours(attribute.name)]:
         mesh.attributes.remove(mesh.attributes[name])
     if values is None:
@@ -182,9 +182,9 @@ def _is_ours(name: str) -> bool:
 
 
 def _make_nodes(tree: bpy.types.GeometryNodeTree, measure: str, scale: Scale) -> None:
-    """Nodes that blend the two steps around the slider's position, for every measure, and colour one of them."""
+    """Add nodes that interpolate every measure between the two steps around the slider, and color one measure."""
     tree.is_modifier = True
-    # The stubs of 5.2 know no kind of socket.
+    # The stubs of 5.2 have no socket types.
     new_socket: Callable[..., object] = present(tree.interface).new_socket
     for direction in ('INPUT', 'OUTPUT'):
         new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
@@ -207,7 +207,7 @@ def _make_nodes(tree: bpy.types.GeometryNodeTree, measure: str, scale: Scale) ->
             expect(bpy.types.GeometryNodeInputNamedAttribute, attribute).data_type = 'FLOAT'
             link(replace.outputs[0], attribute.inputs["Name"])
             ends.append(attribute.outputs[0])
-        # first + part (second - first); after the last step there is none, and the part is 0.
+        # first + part (second - first). There is no step after the last; the part is 0 there.
         difference = _math(tree, 'SUBTRACT', ends[1], ends[0])
         value = _math(tree, 'ADD', ends[0], _math(tree, 'MULTIPLY', difference, part))
         geometry = _store(tree, geometry, f"QC3D {name}", 'FLOAT', value)
@@ -218,7 +218,7 @@ def _make_nodes(tree: bpy.types.GeometryNodeTree, measure: str, scale: Scale) ->
 
 
 def _give(socket: bpy.types.NodeSocket, value: float | str) -> None:
-    """Give an input to which nothing is linked its value."""
+    """Set the value of an input socket without a link."""
     socket.default_value = value  # type: ignore[attr-defined]  # each kind of socket has one, all in one do not
 
 
@@ -278,6 +278,6 @@ def _colour(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale)
 
 
 def _drive(tree: bpy.types.NodeTree, control: Control, chain: Chain) -> None:
-    """Let the node "Slider" follow the control, counted in steps."""
+    """Drive the node "Slider" by the control's position along the steps."""
     curve = compat.new_driver(tree, 'nodes["Slider"].outputs[0].default_value')
     drivers.drive_position(curve, control, chain.places, range(len(chain.places)))

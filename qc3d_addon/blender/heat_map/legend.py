@@ -14,14 +14,14 @@ from ..store import id_properties
 from . import heat_map
 from .colors import Scale
 
-_WIDTH, _HEIGHT, _MARGIN, _TEXT = 220, 14, 24, 12  # pixels of a screen of ordinary resolution
-_SHADING = "qc3d_shading"  # what the view showed before, kept with its screen
+_WIDTH, _HEIGHT, _MARGIN, _TEXT = 220, 14, 24, 12  # pixels at a resolution scale of 1
+_SHADING = "qc3d_shading"  # property of the screen with the previous shading
 
 _handles: list[object] = []
 
 
 def enter(context: bpy.types.Context) -> None:
-    """Let the view, where there is one, show the colours of attributes."""
+    """Let the 3D view, if there is one, show color attributes."""
     shading, screen = _shading(context), context.screen
     if shading is None or screen is None:
         return
@@ -32,20 +32,20 @@ def enter(context: bpy.types.Context) -> None:
 
 
 def leave(context: bpy.types.Context) -> None:
-    """Let the view show what it showed before."""
+    """Restore the previous shading of the view."""
     shading, screen = _shading(context), context.screen
     if shading is None or screen is None or not id_properties.has(screen, _SHADING):
         return
     before = screen.pop(_SHADING)
     shading.type = 'SOLID'
-    with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` kept: the view then stays in Solid
+    with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` stored: the view then stays in Solid
         kind, colours = before
         shading.color_type = colours
         shading.type = kind
 
 
 def _shading(context: bpy.types.Context) -> bpy.types.View3DShading | None:
-    """How the view shows things, where there is a 3D view."""
+    """The shading of the 3D view, None without one."""
     space = context.space_data
     if space is None or space.type != 'VIEW_3D':
         return None
@@ -59,7 +59,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Draw it no longer."""
+    """Stop drawing it."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), 'WINDOW')
 

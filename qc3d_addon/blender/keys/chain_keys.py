@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an earlier bake made for a chain and what plays it, as they are in the file now."""
+"""The shape keys of a chain and its control, as they are in the file now."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .control import Control, path_of, value_path
 
 
 def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
-    """The shape keys that earlier bakes made for a chain and that are still there, by step.
+    """The shape keys that earlier bakes made for a chain and that still exist, by step.
 
-    A key is owned where the record names it and its driver still reads the control. A name that the record has and the
-    mesh has not was deleted or renamed; renamed it is where exactly one other key has that step's driver. A key that
-    was moved to the top, where all others refer to it, is the animator's own from then on.
+    A chain owns a key if the record names it and its driver still reads the control. If the mesh has no key of a
+    recorded name, the key was deleted or renamed: it was renamed if exactly one other key has the driver of that step.
+    A key that was moved to the top of the list, which makes it the Basis, is the user's own from then on.
     """
     curves = drivers.driven_by(keys, path_of(chain))
     curves.pop(value_path(keys.reference_key.name), None)
@@ -44,7 +44,7 @@ def owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKe
 
 
 def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.ShapeKey]:
-    """As ``owned_keys``; raises InputError where one is missing."""
+    """As ``owned_keys``, but raises InputError if one is missing."""
     owned = owned_keys(keys, chain)
     if owned.keys() != chain.keys.keys():
         raise InputError(f"Shape keys of '{chain.slider}' were deleted; re-bake it first.")
@@ -52,9 +52,10 @@ def all_owned_keys(keys: bpy.types.Key, chain: Chain) -> dict[int, bpy.types.Sha
 
 
 def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
-    """What plays the chain: a key's value, or its slider.
+    """The control of the chain: a key's value, or a slider.
 
-    The slider is that on the object of an earlier bake (objects may share a mesh), else that on ``obj``.
+    The slider is the one that the drivers read, on the object of an earlier bake, since objects may share a mesh;
+    without drivers it is the one on ``obj``.
     """
     if chain.on_key:
         return Control(keys_of(obj), chain.on_key)
@@ -66,25 +67,25 @@ def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
 
 
 def is_original(obj: bpy.types.Object, owner: bpy.types.Object, chain: Chain) -> bool:
-    """Whether ``owner`` is only what ``obj`` was copied from: a script copies the slider, but not what reads it."""
+    """Whether ``obj`` is a copy of ``owner``: a script copies the slider too, but the drivers read the original."""
     return owner.type == 'MESH' and owner.data != obj.data and has(owner, chain.slider) and has(obj, chain.slider)
 
 
 def are_drivers_stopped(keys: bpy.types.Key, chain: Chain) -> bool:
-    """Whether Blender has stopped the chain's drivers, which it does for good where the slider was NaN once."""
+    """Whether Blender has stopped the chain's drivers, which it does for good once the slider was NaN."""
     driver = next(_drivers(keys, chain), None)
     return driver is not None and not driver.is_valid
 
 
 def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
-    """Start drivers again that Blender has stopped."""
+    """Restart drivers that Blender has stopped."""
     for curve in drivers.driven_by(keys, path_of(chain)).values():
         present(curve.driver).is_valid = True
     keys.update_tag()
 
 
 def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
-    """The drivers that read the chain's slider, those of its own keys first: there may be thousands of others."""
+    """The drivers that read the chain's control, those of its own keys first: there may be thousands of others."""
     path = path_of(chain)
     for name in chain.keys.values():
         driver = drivers.driver_of(keys, name, path)
@@ -94,6 +95,6 @@ def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
 
 
 def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:
-    """What the chain's keys are relative to: that of the key that plays them, or the Basis."""
+    """The key that the chain's keys are relative to: the same as for the key that plays them, or the Basis."""
     key = keys.key_blocks.get(chain.on_key) if chain.on_key else None
     return keys.reference_key if key is None else key.relative_key

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shapes of a chain: what its keys have to hold, and what its control shows at each step."""
+"""The shapes of a chain: those that its keys store, and those that its control shows at each step."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .chain_keys import all_owned_keys, base_key
 def shapes_by_step(
     obj: bpy.types.Object, met: dict[int, str], frames: NDArray[np.float64]
 ) -> dict[int, NDArray[np.float32]]:
-    """The shapes that a slider of its own needs keys for: every frame but the Basis, which shows where no key is on.
+    """The shapes that a chain with a slider needs keys for: all frames except the Basis, which shows without any key.
 
     Parameters
     ----------
     met
-        Names of the user's own keys by the step that shows them.
+        Names of the user's own keys, by the step that shows them.
     frames
         (k, n, 3) positions from the first key to the last.
 
@@ -48,18 +48,19 @@ def shapes_by_step(
 def offsets_by_step(
     obj: bpy.types.Object, places: tuple[float, ...], frames: NDArray[np.float64]
 ) -> dict[int, NDArray[np.float32]]:
-    """What keys that a key's own value plays add to it: at each step, what its frame has beyond the straight blend.
+    """The shapes that a chain played by a key's value needs: at each inner step, the frame minus the straight blend.
 
     Parameters
     ----------
     places
-        Of the steps, as values of the key.
+        Places of the steps, as values of the key.
     frames
-        (k, n, 3) positions at them, from what the key is relative to up to the key.
+        (k, n, 3) positions at these steps, from the key's base to the key itself.
 
     Returns
     -------
-    (n, 3) float32 by step, absolute positions for keys that are relative to what that key is relative to.
+    dict
+        (n, 3) float32 absolute positions by step, for keys with the same base as that key.
 
     Raises
     ------
@@ -72,7 +73,7 @@ def offsets_by_step(
 
 
 def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
-    """(k, n, 3) what a chain's control shows at each of its steps, whatever was sculpted since.
+    """(k, n, 3) positions that a chain's control shows at each of its steps, including what was sculpted since.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
     keys = keys_of(obj)
     owned = all_owned_keys(keys, chain)
     first = key_coordinates(obj, base_key(keys, chain).name).astype(np.float64)
-    # What the key itself adds where its own value plays the chain.
+    # What the key itself adds if its own value plays the chain.
     whole = shown_coordinates(obj, chain.on_key) - first if chain.on_key else np.zeros_like(first)
     return np.stack(
         [
@@ -93,12 +94,12 @@ def step_shapes(obj: bpy.types.Object, chain: Chain) -> NDArray[np.float64]:
 
 
 def _rounded(obj: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Frames (k, n, 3) as shape keys hold them; raises QC3DError where they cannot."""
+    """Frames (k, n, 3) in single precision, as shape keys store them; raises QC3DError if that is impossible."""
     if frames.ndim != 3 or frames.shape[1:] != (len(mesh_of(obj).vertices), 3):
         raise QC3DError(
             f"The in-betweens have shape {frames.shape} for {len(mesh_of(obj).vertices)} vertices; please report this."
         )
-    with np.errstate(over="ignore"):  # what does not fit is infinite, and refused below
+    with np.errstate(over="ignore"):  # too large values become infinite and are refused below
         rounded = frames.astype(np.float32)
     if not np.isfinite(rounded).all():
         raise QC3DError("An in-between has coordinates that are not finite; try another quality or engine.")

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What plays a chain: a number in the file that the drivers of the chain's shape keys read.
+"""The control of a chain: the number that the drivers of the chain's shape keys read.
 
-It is the value of a key that the user has, whose control then plays the arc, or a slider of the chain's own.
+It is either the value of one of the user's keys, whose own controls then play the arc, or a new slider.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Control(NamedTuple):
     owner
         The data block that has it: shape keys, or an object.
     name
-        What it is called there.
+        Name of the key or the custom property.
     """
 
     owner: bpy.types.Object | bpy.types.Key
@@ -48,28 +48,28 @@ class Control(NamedTuple):
 
     @property
     def is_there(self) -> bool:
-        """Whether its owner has it."""
+        """Whether the owner still has that key or property."""
         if isinstance(self.owner, bpy.types.Key):
             return self.name in self.owner.key_blocks
         return id_properties.has(self.owner, self.name)
 
     @property
     def value(self) -> float:
-        """Where it is; the control must have no ``problem``."""
+        """Its present value; the control must have no ``problem``."""
         if isinstance(self.owner, bpy.types.Key):
             return float(self.owner.key_blocks[self.name].value)
         return float(self.owner[self.name])
 
     @property
     def shown(self) -> tuple[bpy.types.bpy_struct, str]:
-        """What has it and as which property, for a panel to draw."""
+        """The struct and the name of the property in it, for a panel to draw."""
         if isinstance(self.owner, bpy.types.Key):
             return self.owner.key_blocks[self.name], "value"
         return self.owner, self.path
 
     @property
     def problem(self) -> str | None:
-        """Why it cannot play anything, or None. Quick enough for a panel."""
+        """Why it cannot play anything, or None. Fast enough to call on every redraw of a panel."""
         owner, name = self.owner, self.name
         if not self.is_there:
             if self.is_key:
@@ -77,26 +77,26 @@ class Control(NamedTuple):
             return f"The slider '{name}' was deleted; re-bake it first."
         if not self.is_number:
             return (
-                f"The slider '{name}' of '{owner.name}' is not a number any more; delete that custom property, then "
+                f"The slider '{name}' of '{owner.name}' is no longer a number; delete that custom property, then "
                 "re-bake to have it again."
             )
         if math.isnan(self.value):
-            return f"The slider '{name}' of '{owner.name}' has no value (NaN); give it one, or mend what drives it."
+            return f"The slider '{name}' of '{owner.name}' has no value (NaN); set one, or repair what drives it."
         return None
 
     @property
     def is_number(self) -> bool:
-        """Whether it has a type that can play anything: the user may give a slider any other."""
+        """Whether its type is numeric: the user may change the type of a custom property."""
         return self.is_key or isinstance(self.owner[self.name], (bool, int, float))
 
     def require(self) -> None:
-        """Raise InputError where it cannot play anything."""
+        """Raise InputError if it cannot play anything."""
         problem = self.problem
         if problem is not None:
             raise InputError(problem)
 
     def put(self, value: float) -> str | None:
-        """Set it, or say why it stays where it is."""
+        """Set its value; a sentence if it stays as it is."""
         if isinstance(self.owner, bpy.types.Key):
             animation = self.owner.animation_data
             if animation is not None and animation.drivers.find(self.path) is not None:
@@ -105,7 +105,7 @@ class Control(NamedTuple):
         elif isinstance(self.owner[self.name], float):
             self.owner[self.name] = value
         else:
-            return f"The slider '{self.name}' has whole numbers only and stays where it is."
+            return f"The slider '{self.name}' takes whole numbers only and stays where it is."
         self.owner.update_tag()
         return None
 
@@ -115,25 +115,25 @@ class Control(NamedTuple):
 
 
 def path_of(chain: Chain) -> str:
-    """The path of what plays a chain, from the data block that has it."""
+    """RNA path of the control of a chain, from the data block that owns it."""
     return value_path(chain.on_key) if chain.on_key else slider_path(chain.slider)
 
 
 def slider_path(name: str) -> str:
-    """The path of a custom property from its object."""
+    """RNA path of a custom property, from its object."""
     return f'["{bpy.utils.escape_identifier(name)}"]'
 
 
 def value_path(key_name: str) -> str:
-    """The path of a shape key's value from its data block."""
+    """RNA path of a shape key's value, from its data block."""
     return f"{key_path(key_name)}value"
 
 
 def mute_path(key_name: str) -> str:
-    """The path of whether a shape key is muted, from its data block."""
+    """RNA path of a shape key's mute flag, from its data block."""
     return f"{key_path(key_name)}mute"
 
 
 def key_path(key_name: str) -> str:
-    """What the paths of all properties of a shape key begin with."""
+    """Common start of the RNA paths of all properties of a shape key."""
     return f'key_blocks["{bpy.utils.escape_identifier(key_name)}"].'

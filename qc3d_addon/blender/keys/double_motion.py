@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves the mesh a second time beside in-betweens: keys of theirs that are on by themselves, other sliders."""
+"""Warnings about motion that adds to in-betweens: keys of the chain with a value of their own, other sliders."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .control import value_path
 
 
 def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) -> list[str]:
-    """Sentences about what adds to what the control of a chain shows; quick enough for a panel.
+    """Sentences about motion that adds to what the control of a chain shows; fast enough for every redraw of a panel.
 
     Parameters
     ----------
     chains
-        All of the object's.
+        All chains of the object.
     """
     keys = keys_of(obj)
     if chain.on_key:
@@ -32,7 +32,7 @@ def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) 
 
 
 def _own_keys(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.ShapeKey]:
-    """The user's keys that a slider goes through, but the Basis."""
+    """The user's keys that a slider goes through, except the Basis."""
     for name in dict.fromkeys(chain.through):
         key = keys.key_blocks.get(name)
         if key is not None and key != keys.reference_key:
@@ -40,7 +40,7 @@ def _own_keys(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.ShapeKey]
 
 
 def _on_by_itself(key: bpy.types.ShapeKey) -> str:
-    """What moves a key beside the slider; empty where nothing does."""
+    """A sentence about what moves a key besides the slider; empty if nothing does."""
     keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     animation = keys.animation_data
     if key.mute:
@@ -50,7 +50,7 @@ def _on_by_itself(key: bpy.types.ShapeKey) -> str:
     if compat.is_animated(keys, path):
         return f"Key '{key.name}' is animated, which adds to what the slider shows."
     if key.value != 0.0:
-        return f"Key '{key.name}' is on by itself ({key.value:.2f}), which adds to what the slider shows; set it to 0."
+        return f"Key '{key.name}' has the value {key.value:.2f}, which adds to what the slider shows; set it to 0."
     return ""
 
 
@@ -64,9 +64,9 @@ def _shown_twice(keys: bpy.types.Key, chain: Chain, chains: Sequence[Chain]) -> 
 
 
 def unknown_inbetweens(keys: bpy.types.Key, chain: Chain, chains: Sequence[Chain]) -> Iterator[str]:
-    """Sentences about keys that the same key's value plays and no record knows, as after a record was forgotten."""
+    """Sentences about keys that the same value plays but no record lists, as after a damaged record was deleted."""
     known = {value_path(key.name) for other in chains for key in owned_keys(keys, other).values()}
     for path, curve in drivers.driven_by(keys, value_path(chain.on_key)).items():
         if path not in known and path.endswith(".value") and len(curve.keyframe_points) > 1:
             name = bpy.utils.unescape_identifier(path.removeprefix('key_blocks["').removesuffix('"].value'))
-            yield f"Key '{name}' plays on '{chain.on_key}' too, from a bake that is not known any more; delete it."
+            yield f"Key '{name}', of an earlier bake without a record, also follows '{chain.on_key}'; delete it."

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drivers that give numbers of a control's position: how much of a shape to show, or how far along the steps it is.
+"""Drivers that compute numbers from a control: the value of a shape key, or the position along the steps.
 
-Such a driver reads the control as its one variable, and its own curve is the function. Blender evaluates that in C,
-without the permission that scripts need. A cubic Bézier curve whose handles stand at a third of every interval is the
-cubic polynomial with these slopes (Farin 2002, *Curves and Surfaces for CAGD*, chapter 4).
+Such a driver reads the control as its one variable, and its own F-curve is the function. Blender evaluates that in C,
+without the permission that Python expressions need. A cubic Bézier curve whose handles lie at a third of every interval
+is the cubic polynomial with these slopes (Farin 2002, *Curves and Surfaces for CAGD*, chapter 4).
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from .control import Control, key_path, mute_path, value_path
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
 
-VARIABLE = "slider"
-# Blender takes points of a curve that are nearer than 0.01 to each other as one.
+VARIABLE, MUTED = "slider", "muted"
+# Blender merges points of a curve that are nearer than 0.01 to each other.
 _LEAST_STEP = 0.02
-# A cardinal spline falls to about 0.27 of itself from knot to knot: beyond so many it is 0 in single precision.
+# In knots. A cardinal spline decays by a factor of 0.27 per knot, so beyond 16 knots it is 0 in single precision.
 _REACH = 16
-_CLOSE = 1e-4  # of values and places in curves: single precision, which users do not change by as little
+_CLOSE = 1e-4  # tolerance for values and places in curves, which are in single precision
 
 
 def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, step: int) -> None:
-    """Let the value of a shape key be the weight of a step, by its driver, which is made where there is none."""
+    """Drive the value of a shape key by the weight of a step; adds the driver if there is none."""
     keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
     if curve is None:
@@ -41,6 +41,9 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     knots, values, slopes = _function(weights, step)
     stretch = _stretch(weights.knots)
     read(present(curve.driver), control, stretch)
+    if control.is_key:
+        _mute_with(present(curve.driver), control, stretch)
+        _free_mute(key, control)
     knots, slopes = knots * stretch, slopes / stretch
     width = np.diff(knots) / 3.0
     before, after = np.append(width[0], width), np.append(width, width[-1])
@@ -50,17 +53,33 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     curve.extrapolation = 'LINEAR'
 
 
-def drive_mute(key: bpy.types.ShapeKey, control: Control) -> None:
-    """Let a key be muted together with the one that plays it."""
+def _mute_with(driver: bpy.types.Driver, control: Control, stretch: int) -> None:
+    """Let a driver read 0, where weights are 0, while the key that it reads is muted.
+
+    A driver of the key's own ``mute`` would be simpler, but makes Blender 4.5 and 5.2 write the values of all driven
+    keys back, to unshare what they are in, while other threads give them new ones: now and then an in-between shows the
+    frame before.
+    """
+    variable = driver.variables.new()
+    variable.name, variable.type = MUTED, 'SINGLE_PROP'
+    target = variable.targets[0]
+    target.id_type, target.id, target.data_path = control.id_type, control.owner, mute_path(control.name)
+    driver.type = 'SCRIPTED'
+    times = "" if stretch == 1 else f" * {stretch}"
+    driver.expression = f"{VARIABLE}{times} * (1 - {MUTED})"  # simple enough to run without permission, too
+
+
+def _free_mute(key: bpy.types.ShapeKey, control: Control) -> None:
+    """Remove the driver by which an earlier bake muted a key."""
     keys, path = expect(bpy.types.Key, key.id_data), mute_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
-    if curve is None:
-        curve = compat.new_driver(keys, path)
-    _read_path(present(curve.driver), control, mute_path(control.name))
+    if curve is not None and _reads_alone(curve.driver, mute_path(control.name)):
+        keys.driver_remove(path)
+        key.mute = False
 
 
 def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike, values: ArrayLike) -> None:
-    """Let a new driver go straight through values (k,) at places (k,) of the control, and stay at them at the ends."""
+    """Let a new driver interpolate values (k,) at places (k,) of the control linearly, constant beyond the ends."""
     stretch = _stretch(np.asarray(places))
     read(present(curve.driver), control, stretch)
     points = np.column_stack([np.asarray(places) * stretch, values])
@@ -69,7 +88,7 @@ def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike,
 
 
 def read(driver: bpy.types.Driver, control: Control, stretch: int = 1) -> None:
-    """Let a driver have the control as its only variable, and so many times its value."""
+    """Let a driver read the control as its only variable and multiply it by ``stretch``."""
     _read_path(driver, control, control.path)
     if stretch != 1:
         driver.type = 'SCRIPTED'
@@ -88,11 +107,11 @@ def _read_path(driver: bpy.types.Driver, control: Control, path: str) -> None:
     target.id_type = control.id_type
     target.id = control.owner
     target.data_path = path
-    driver.is_valid = True  # Blender stops a driver for good where its variable was NaN once
+    driver.is_valid = True  # Blender stops a driver for good once its variable was NaN
 
 
 def shows(curve: bpy.types.FCurve, weights: Weights, step: int) -> bool:
-    """Whether a driver of this curve gives the weight of a step, as a bake of this or an earlier version made it."""
+    """Whether a driver's curve is the weight of a step, as this version or an earlier one writes it."""
     if present(curve.driver).expression == _earlier_expression(step, len(weights.knots) - 1):
         return True
     knots, values, _ = _function(weights, step)
@@ -111,7 +130,7 @@ def undrive(key: bpy.types.ShapeKey) -> None:
 
 
 def paths_read(keys: bpy.types.Key) -> Counter[str]:
-    """How often drivers of the file read properties of shape keys, by path."""
+    """Number of times that drivers of the file read properties of shape keys, by RNA path."""
     return Counter(
         target.data_path
         for curve in all_drivers()
@@ -122,7 +141,7 @@ def paths_read(keys: bpy.types.Key) -> Counter[str]:
 
 
 def all_drivers() -> Iterator[bpy.types.FCurve]:
-    """All drivers of the file, but those of what nobody uses any more, which goes when the file is saved."""
+    """All drivers of the file, except those of data blocks without users, which are not saved."""
     for collection in bpy.data.bl_rna.properties:
         if collection.type != 'COLLECTION':
             continue
@@ -139,13 +158,13 @@ def all_drivers() -> Iterator[bpy.types.FCurve]:
 
 
 def driver_of(keys: bpy.types.Key, key_name: str, path: str) -> bpy.types.Driver | None:
-    """The driver of a shape key's value, where it reads the control of that path alone. Quick enough for a panel."""
+    """The driver of a shape key's value if it reads only the control at ``path``. Fast enough for a panel."""
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(value_path(key_name))
     return curve.driver if curve is not None and _reads_alone(curve.driver, path) else None
 
 
 def driven_by(keys: bpy.types.Key, path: str) -> dict[str, bpy.types.FCurve]:
-    """The curves of the drivers that read the control of that path alone, by the path of what they drive."""
+    """The curves of the drivers that read only the control at ``path``, by the RNA path of the driven property."""
     if keys.animation_data is None:
         return {}
     return {curve.data_path: curve for curve in keys.animation_data.drivers if _reads_alone(curve.driver, path)}
@@ -161,18 +180,18 @@ def reads(driver: bpy.types.Driver | None, control: Control) -> bool:
 
 
 def _stretch(knots: NDArray[np.float64]) -> int:
-    """How many times the control a curve is over, so that its points stand apart."""
+    """Factor on the control that spreads the points of a curve at least ``_LEAST_STEP`` apart."""
     least = float(np.diff(knots).min())
     return 1 if least >= _LEAST_STEP else 10 ** int(np.ceil(np.log10(_LEAST_STEP / least)))
 
 
 def _function(weights: Weights, step: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Knots (k,), values (k,) and slopes (2, k) of the weight of a step, as far as it is not 0."""
+    """Knots (k,), values (k,) and slopes (2, k) of the weight of a step where it is not 0."""
     near = slice(max(step - _REACH, 0), step + _REACH + 1)
     knots, slopes = weights.knots[near], weights.slopes[:, near, step].copy()
     values = np.zeros(len(knots))
     values[step - near.start] = 1.0
-    slopes[np.abs(slopes) < 1e-6] = 0.0  # what is left of it where the reach ends is no slope to go on along
+    slopes[np.abs(slopes) < 1e-6] = 0.0  # so that the curve is 0, not linear, beyond the last knot in reach
     return knots, values, slopes
 
 
@@ -183,7 +202,7 @@ def _set_curve(
     right: NDArray[np.float64],
     interpolation: str,
 ) -> None:
-    """Make a curve anew of points (k, 2) with handles (k, 2) on either side."""
+    """Replace all points of a curve by points (k, 2) with left and right handles (k, 2)."""
     while curve.modifiers:
         curve.modifiers.remove(curve.modifiers[0])
     frames = curve.keyframe_points
@@ -198,17 +217,17 @@ def _set_curve(
 
 
 def _reads_alone(driver: bpy.types.Driver | None, path: str) -> bool:
+    """Whether a driver reads the control of a path and, beside it, at most whether it is muted."""
     if driver is None:
         return False
     variables = driver.variables
     return (
-        len(variables) == 1
-        and variables[0].name == VARIABLE
+        [variable.name for variable in variables] in ([VARIABLE], [VARIABLE, MUTED])
         and variables[0].type == 'SINGLE_PROP'
         and variables[0].targets[0].data_path == path
     )
 
 
 def _earlier_expression(step: int, intervals: int) -> str:
-    """The hat that drivers of earlier versions have, which a bake replaces by a curve."""
+    """The hat function in drivers of earlier versions; a bake replaces it by a curve."""
     return f"max(0, 1 - abs({VARIABLE} * {intervals} - {step}))"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens that are the user's by now: sculpted since they were baked, or locked. A new bake keeps them."""
+"""In-betweens that the user has sculpted or locked since they were baked. A new bake keeps them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..store.records import LEAST_DISTANCE, Chain
 from .chain_keys import base_key, owned_keys
 
 T = TypeVar("T")
-_ROUNDING = 4e-7  # of the coordinates: what moving a shape along with another one changes
+_ROUNDING = 4e-7  # relative rounding error of single precision after Blender moved a shape along with another one
 
 
 class Held(NamedTuple):
@@ -40,7 +40,7 @@ class Sculpted:
     held
         By place.
     before
-        What the bake before wrote, by place; empty where that is not known.
+        Shapes that the previous bake wrote, by place; empty if they are unknown.
     """
 
     held: dict[float, Held]
@@ -48,7 +48,7 @@ class Sculpted:
 
     @classmethod
     def of(cls, obj: bpy.types.Object, chain: Chain) -> Sculpted:
-        """Those of an earlier bake of a chain, none where there was none."""
+        """The sculpted or locked in-betweens of a chain; none if it was never baked."""
         keys = keys_of(obj)
         owned = owned_keys(keys, chain)
         kept = kept_shapes.read(keys, chain.slider, len(mesh_of(obj).vertices)) if owned else None
@@ -65,17 +65,19 @@ class Sculpted:
 
     @property
     def places(self) -> tuple[float, ...]:
-        """Places between the ends at which there has to be an in-between again."""
+        """Places between the ends at which the new bake needs an in-between."""
         return tuple(place for place in self.held if 0.0 < place < 1.0)
 
     def require_among(self, places: tuple[float, ...]) -> None:
-        """Raise InputError where a new bake has no step at the place of one of them."""
+        """Raise InputError if a new bake has no step at the place of one of them."""
         for place in self.places:
             if _at(dict.fromkeys(places, True), place) is None:
-                raise InputError(f"'{self.held[place].name}' was sculpted or locked meanwhile; bake again to keep it.")
+                raise InputError(
+                    f"'{self.held[place].name}' was sculpted or locked during the bake; bake again to keep it."
+                )
 
     def kept(self, places: tuple[float, ...], shapes: dict[int, Shape]) -> tuple[dict[int, Shape], Shapes, list[str]]:
-        """Shapes by step as they are to be written, those to remember by place, and sentences about what was kept."""
+        """The shapes to write, by step; those to remember, by place; and sentences about what was kept."""
         written, remembered, sentences = {}, {}, []
         for step, shape in shapes.items():
             held = _at(self.held, places[step])
@@ -87,19 +89,19 @@ class Sculpted:
                 sentences.append(f"'{held.name}' is locked and was left as it is.")
             elif held is not None:
                 written[step] = shape + held.correction
-                sentences.append(f"'{held.name}' keeps what was sculpted into it; delete it to have it made anew.")
+                sentences.append(f"'{held.name}' keeps what was sculpted into it; delete it to have it made again.")
         return written, remembered, sentences
 
 
 def _at(found: dict[float, T], place: float) -> T | None:
-    """What is at a place, or next to nothing from it."""
+    """The value at a place, within ``LEAST_DISTANCE``."""
     return next((value for other, value in found.items() if abs(other - place) < LEAST_DISTANCE), None)
 
 
 def _moved(current: Shape, written: Shape, base: Shape, base_before: Shape) -> Shape:
-    """(n, 3) what was sculpted into a key: not what moved together with the key that it is relative to.
+    """(n, 3) offsets that were sculpted into a key, without those of the key that it is relative to.
 
-    Blender moves keys along when that one is edited; scripts do not.
+    When a key is edited, Blender moves along the keys that are relative to it; scripts do not.
     """
     difference = (current - base) - (written - base_before)
     rounding = _ROUNDING * np.abs(current).max(initial=0.0)

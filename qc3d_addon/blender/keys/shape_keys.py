@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the shape keys of a chain: all of them, or, where something fails, none."""
+"""Writes the shape keys of a chain: all of them or, if anything fails, none."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Steps(NamedTuple):
-    """Where the steps of a chain are on its control, as ``Chain`` has it."""
+    """Places and corners of the steps of a chain, as in ``Chain``."""
 
     places: tuple[float, ...]
     corners: tuple[int, ...]
@@ -39,7 +39,7 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
     Raises
     ------
     InputError
-        If the slider is not a number any more, or its object or its action is linked.
+        If the slider is no longer a number, or its object or its action is linked.
     """
     control = _require_local(obj, chain)
     if control.is_there:
@@ -49,7 +49,7 @@ def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, 
 
 
 def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
-    """What plays the chain, where everything that removing the chain changes can be changed.
+    """The control of the chain, after checking everything that removing the chain changes.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def require_removable(obj: bpy.types.Object, chain: Chain) -> Control:
 
 
 def require_action(block: compat.Animated) -> None:
-    """Raise InputError where the keyframes of an object or of shape keys cannot be changed."""
+    """Raise InputError if the keyframes of an object or of shape keys cannot be changed."""
     action = block.animation_data and block.animation_data.action
     if action and (action.library or action.override_library):
         raise InputError(f"The action '{action.name}' is linked; make it local first.")
@@ -88,7 +88,7 @@ def chain_written(
     steps: Steps,
     keyframes: tuple[int, int] | None,
 ) -> Iterator[tuple[ExitStack, list[str]]]:
-    """Put the shapes of a chain into shape keys that one control plays; where that or the block fails, take it back.
+    """Write the shapes of a chain into shape keys that one control plays; undo everything if that or the block fails.
 
     Keys of an earlier bake at the same place keep their name and order and get the new shape; those at other places
     are replaced when the block ends. No other key changes.
@@ -108,12 +108,15 @@ def chain_written(
 
     Yields
     ------
-    What takes everything back where the block fails, to add to, and sentences for the user.
+    undo : ExitStack
+        Undoes everything if the block fails; the block may add to it.
+    notes : list of str
+        Sentences for the user.
 
     Raises
     ------
     InputError
-        If a key or action cannot be written, or the slider is not a number any more.
+        If a key or action cannot be written, or the slider is no longer a number.
     """
     require_writable(obj, chain, keyframes)
     keys, control = keys_of(obj), control_of(obj, chain)
@@ -144,8 +147,6 @@ def chain_written(
             written[step] = new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
-            if control.is_key:
-                drivers.drive_mute(written[step], control)
         if keyframes is not None:
             curve, notes = slider.begin_keyframes(control, chain, keyframes, undo)
         chain.keys = {step: written[step].name for step in sorted(written)}
@@ -162,11 +163,9 @@ def chain_written(
 def _let_play(kept: dict[int, bpy.types.ShapeKey], control: Control, weights: Weights) -> None:
     """Give keys of an earlier bake the weights of this one."""
     for step, key in kept.items():
-        if (key.slider_min, key.slider_max) == (0.0, 1.0):  # else the user chose it
+        if (key.slider_min, key.slider_max) == (0.0, 1.0):  # otherwise the user chose the range
             _widen(key)
         drivers.drive_value(key, control, weights, step)
-        if control.is_key:
-            drivers.drive_mute(key, control)
 
 
 def _kept(
@@ -187,7 +186,8 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
 
     Returns
     -------
-    Sentences about keys that stay, switched off, since drivers of the user read them.
+    list of str
+        Sentences about keys that stay, with value 0, because drivers of the user read them.
     """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
     notes = []
@@ -198,7 +198,7 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
             drivers.undrive(key)
             key.value = 0.0
             what = "driver reads" if readers == 1 else "drivers read"
-            notes.append(f"Key '{key.name}' stays, switched off, since {readers} {what} it.")
+            notes.append(f"Key '{key.name}' stays, with value 0, since {readers} {what} it.")
         else:
             _remove_key(obj, key)
     _activate(obj, active)
@@ -207,7 +207,7 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
 
 
 def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
-    """Remove a shape key that no driver drives; the active key stays active where it is not this one."""
+    """Remove a shape key without a driver; the active key stays active unless it is this one."""
     active = None if obj.active_shape_key == key else obj.active_shape_key
     obj.shape_key_remove(key)
     _activate(obj, active)
@@ -224,7 +224,7 @@ def new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: Ex
 
 
 def _widen(key: bpy.types.ShapeKey) -> None:
-    """Let a key have the values of smooth weights, which leave 0 to 1; Blender allows no more."""
+    """Widen a key's range to Blender's maximum: smooth weights exceed [0, 1]."""
     key.slider_min, key.slider_max = -10.0, 10.0
 
 

@@ -3,7 +3,8 @@
 """Before and after: while it is on, a control shows the straight blend of its keys, as if nothing had been baked.
 
 Nothing is removed. The in-betweens are muted, and where a slider plays copies of the user's keys, these fade straight
-into each other. What was done is kept with the shape keys, so undo and copies know of it. Saved files are without it.
+into each other. What was done is kept with the shape keys, so undo and copies know of it; a saved file is
+as without it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that bakes many keys of an object in one run, each on itself."""
+"""The operator that bakes many keys of an object in one run, each played by its own value."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -33,29 +33,29 @@ class KeyChoice(bpy.types.PropertyGroup):
 
 
 class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
-    """Bake in-betweens on many shape keys of the object in one run; keys that need none are left alone"""
+    """Bake in-betweens for many shape keys at once, each played by its own value; keys that need none are skipped"""
 
     bl_idname = "qc3d.bake_keys"
     bl_label = "Bake Keys"
 
     if TYPE_CHECKING:
         which: str
-        # In place of the names of an operator's own custom properties, which it has none of.
+        # Shadows bpy_struct.keys, the names of custom properties, of which an operator has none.
         keys: "bpy.types.bpy_prop_collection_idprop[KeyChoice]"  # type: ignore[assignment]
     else:
         which: EnumProperty(
             name="Keys",
             description="The keys to bake",
             items=[
-                ("all", "All", "Every key but the Basis and what was baked"),
-                ("selected", "Selected", "Those selected in the list of shape keys, from Blender 5 on; else asks"),
-                ("named", "Named", "Those with a tick among the operator's keys"),
+                ("all", "All", "All keys except the Basis and baked in-betweens"),
+                ("selected", "Selected", "Keys selected in the list; before Blender 5, keys that you tick in a dialog"),
+                ("named", "Named", "Keys that are ticked in the operator's own list"),
             ],
             default="all",
             options={'SKIP_SAVE'},
         )
         keys: CollectionProperty(
-            name="Keys", description="Keys to bake, as [{\"name\": key}, …]", type=KeyChoice, options={'SKIP_SAVE'}
+            name="Keys", description="Keys to bake, as [{\"name\": key}, ...]", type=KeyChoice, options={'SKIP_SAVE'}
         )
 
     @classmethod

@@ -11,7 +11,7 @@ from .common import Status
 
 
 class QC3D_OT_cancel(bpy.types.Operator):
-    """Stop the work that is running; nothing is changed. Esc does so with the mouse here or over the status bar"""
+    """Stop the running work; nothing is changed. Esc does the same with the mouse here or over the status bar"""
 
     bl_idname = "qc3d.cancel"
     bl_label = "Cancel"
@@ -20,7 +20,7 @@ class QC3D_OT_cancel(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if jobs.current() is None:
-            cls.poll_message_set("Nothing is being baked.")
+            cls.poll_message_set("No bake is running.")
             return False
         return True
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators that do something with in-betweens that were baked."""
+"""The operators that work on baked in-betweens."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -21,7 +21,7 @@ _MOST_FRAMES = 100_000
 
 
 class ChainWork(OperatorMixin):
-    """Does something with the chosen chain at once; an operator says what by ``work``."""
+    """Works on the chosen chain at once, without a child process; an operator defines ``work``."""
 
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -29,7 +29,10 @@ class ChainWork(OperatorMixin):
         slider: str
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        """Do it; sentences for the user, the last of them what was done. Raises QC3DError with nothing changed."""
+        """Do the work; returns sentences for the user, the last of which says what was done.
+
+        Raises QC3DError if it is impossible; nothing is changed then.
+        """
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Status:
@@ -50,7 +53,7 @@ class ChainWork(OperatorMixin):
 
 
 class QC3D_OT_remove(ChainWork, bpy.types.Operator):
-    """Remove these in-betweens: their shape keys, drivers, slider, and the keyframes that the bake made"""
+    """Remove these in-betweens with their shape keys, drivers, slider, and the keyframes that the bake made"""
 
     bl_idname = "qc3d.remove"
     bl_label = "Remove"
@@ -67,7 +70,7 @@ class QC3D_OT_remove(ChainWork, bpy.types.Operator):
 
 
 class QC3D_OT_play_on_key(ChainWork, bpy.types.Operator):
-    """Let the last key's own value play these in-betweens, in place of their slider"""
+    """Play these in-betweens by the last key's own value instead of their slider"""
 
     bl_idname = "qc3d.play_on_key"
     bl_label = "Play on the Key"
@@ -84,7 +87,7 @@ class QC3D_OT_play_on_key(ChainWork, bpy.types.Operator):
 
 
 class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
-    """Turn what the slider does over a range of frames into keyframes of the shape keys, without drivers"""
+    """Replace slider and drivers by keyframes of the shape keys over a range of frames"""
 
     bl_idname = "qc3d.to_keyframes"
     bl_label = "Bake to Keyframes"
@@ -96,10 +99,10 @@ class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
     else:
         slider: SLIDER
         frame_start: IntProperty(
-            name="Start", description="First frame; the scene's where left out", options={'SKIP_SAVE'}
+            name="Start", description="First frame; by default that of the scene", options={'SKIP_SAVE'}
         )
         frame_end: IntProperty(
-            name="End", description="Last frame; the scene's where left out", options={'SKIP_SAVE'}
+            name="End", description="Last frame; by default that of the scene", options={'SKIP_SAVE'}
         )
 
     @classmethod
@@ -119,7 +122,7 @@ class QC3D_OT_to_keyframes(ChainWork, bpy.types.Operator):
 
 
 class QC3D_OT_absolute_keys(ChainWork, bpy.types.Operator):
-    """Make a copy of the object whose absolute shape keys are these in-betweens, played by its evaluation time"""
+    """Copy the object and give the copy these in-betweens as absolute shape keys, played by the evaluation time"""
 
     bl_idname = "qc3d.absolute_keys"
     bl_label = "Copy with Absolute Keys"
@@ -136,7 +139,7 @@ class QC3D_OT_absolute_keys(ChainWork, bpy.types.Operator):
 
 
 class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
-    """Make these in-betweens for the other side of a symmetric mesh, with a slider of their own"""
+    """Make the mirror image of these in-betweens for the other side of a symmetric mesh, with its own slider or key"""
 
     bl_idname = "qc3d.mirror"
     bl_label = "Mirror"
@@ -163,7 +166,7 @@ class QC3D_OT_mirror(ChainWork, bpy.types.Operator):
 
 
 class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
-    """Write these in-betweens as an Alembic file, the slider going from 0 to 1"""
+    """Write these in-betweens as an Alembic file in which the slider goes from 0 to 1"""
 
     bl_idname = "qc3d.export_alembic"
     bl_label = "Export Alembic"
@@ -195,7 +198,7 @@ class QC3D_OT_export_alembic(ChainWork, bpy.types.Operator):
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
         if not self.filepath:
-            raise InputError("Name a file to write to.")
+            raise InputError("Name a file to write.")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".abc"))
         alembic.export_alembic(context, obj, chain, path, self.frames)
         return [f"{path.name} has '{obj.name}' in {self.frames} frames."]

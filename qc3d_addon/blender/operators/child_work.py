@@ -25,36 +25,35 @@ _TICK = 0.05  # seconds between looks at the child process
 
 
 class ChildWork(OperatorMixin):
-    """Plan the work, let a child process do it, write its outcome; an operator says how by ``plan`` and ``write``.
+    """Plan the work, run it in a child process, write the outcome.
 
-    One that has several plans names the next by ``following``, and writes all by ``write_all``.
-
-    From a button it is a modal operator, which Esc ends with the mouse over the progress. Called by a script, or
-    without a window, it runs to its end.
-    Nothing is written unless all of the work was done.
+    An operator defines ``plan`` and ``write``; one with several plans returns the next from ``following`` and writes
+    all outcomes in ``write_all``. Started from a button it is a modal operator, which Esc cancels with the mouse over
+    the progress; called by a script or without a window, it blocks until the end. Nothing is written unless all of
+    the work was done.
     """
 
-    bl_options = {'UNDO'}  # no panel to adjust it: each change would run it all again
+    bl_options = {'UNDO'}  # without REGISTER: its adjustment panel would run everything again at each change
 
     def plan(self, context: bpy.types.Context) -> Plan | None:
-        """What to compute, None where nothing is to be; raises QC3DError where it cannot be done."""
+        """What to compute, or None if there is nothing to do; raises QC3DError if it is impossible."""
         raise NotImplementedError
 
     def write(self, plan: Plan, outcome: Outcome) -> list[str]:
-        """Put what came of it into the file; sentences for the user, the last of them what was done."""
+        """Write the outcome into the file; returns sentences for the user, the last of which says what was done."""
         raise NotImplementedError
 
     @property
     def part(self) -> tuple[int, int]:
-        """Which of how many plans is at work, counted from 0."""
+        """Number of the running plan, from 0, and the number of plans."""
         return (0, 1)
 
     def following(self, context: bpy.types.Context, plan: Plan, outcome: Outcome | QC3DError) -> Plan | None:
-        """What to compute after this; None at the end."""
+        """The next plan, or None after the last."""
         return None
 
     def write_all(self, plan: Plan | None, outcome: Outcome | QC3DError | None) -> list[str]:
-        """Put everything into the file after the last plan's outcome; raises QC3DError where nothing was written."""
+        """Write everything into the file after the last plan; raises QC3DError if nothing was written."""
         if isinstance(outcome, QC3DError):
             raise outcome
         assert plan is not None
@@ -107,14 +106,14 @@ class ChildWork(OperatorMixin):
         if is_escape and progress_bar.is_at(present(context.window), event.mouse_x, event.mouse_y):
             jobs.cancel()
         if self._job.is_cancelled:
-            self.report({'INFO'}, f"{self.bl_label} was cancelled; nothing was changed.")
+            self.report({'INFO'}, f"{self.bl_label} was canceled; nothing was changed.")
             return {'CANCELLED'}
         if event.type != 'TIMER':
             return {'PASS_THROUGH'}
         return self._guarded(context, lambda: self._step(context))
 
     def _guarded(self, context: bpy.types.Context, work: Callable[[], Status]) -> Status:
-        """Do a part of the work; where it cannot be done, say why and leave nothing running."""
+        """Do a part of the work; if it fails, report why and leave nothing running."""
         try:
             return work()
         except QC3DError as error:
@@ -122,7 +121,7 @@ class ChildWork(OperatorMixin):
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
         except BaseException:
-            jobs.end()  # else no other could ever start
+            jobs.end()  # otherwise no other job could ever start
             raise
 
     def _begin(self, context: bpy.types.Context, plan: Plan | None) -> Status:
@@ -145,7 +144,7 @@ class ChildWork(OperatorMixin):
         self._job.at_end(partial(_leave_window, timer))
 
     def _step(self, context: bpy.types.Context) -> Status:
-        """Look at the child process; go on with the next plan, or to the end."""
+        """Poll the child process; start the next plan after one, and finish after the last."""
         outcome: Outcome | QC3DError | None
         try:
             outcome = self._job.poll()
@@ -162,7 +161,7 @@ class ChildWork(OperatorMixin):
         return {'PASS_THROUGH'}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender ends the operator: the window closes, another file is loaded, the add-on is disabled."""
+        """Blender ends the operator because the window closes, another file is loaded or the add-on is disabled."""
         jobs.cancel()
 
     def _finish(self, sentences: list[str]) -> Status:
@@ -174,7 +173,7 @@ class ChildWork(OperatorMixin):
 
     def _show(self, context: bpy.types.Context) -> None:
         shown = (self._job.stage, round(self._job.fraction, 2), int(self._job.seconds))
-        if shown != getattr(self, "_shown", None):  # drawing takes time from what the user does
+        if shown != getattr(self, "_shown", None):  # needless redraws would make the window sluggish
             self._shown = shown
             progress_bar.show(context)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the operators share: when their buttons are disabled, and why."""
+"""Shared by the operators: when their buttons are disabled and why, and which chain they work on."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ from ..properties import panel_keys, settings_of
 from ..store import checks
 from ..store.records import Chain, Record
 
-# What an operator says of itself when it ends, or goes on.
+# The return values of an operator.
 Status = set[Literal['RUNNING_MODAL', 'CANCELLED', 'FINISHED', 'PASS_THROUGH', 'INTERFACE']]
 
 if TYPE_CHECKING:
     SLIDER = str
-    OperatorMixin = bpy.types.Operator  # to mypy what operators share is an operator; to Blender each of them is
+    OperatorMixin = bpy.types.Operator  # for mypy only: Blender wants just the final classes to be operators
 else:
     SLIDER = StringProperty(
-        name="Slider", description="The slider of the in-betweens; the newest where left out", options={'SKIP_SAVE'}
+        name="Slider",
+        description="Name of the slider that plays the in-betweens; by default the newest",
+        options={'SKIP_SAVE'},
     )
     OperatorMixin = object
 
@@ -38,12 +40,12 @@ def end_previews() -> None:
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether the active object can be worked on now; where not, the disabled button says why."""
+    """Whether the active object can be worked on now; if not, the disabled button says why."""
     return _poll(operator, checks.object_problem(context.active_object) or jobs.busy_problem())
 
 
 def poll_panel_keys(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether the keys that the panel shows can be used; a script, which names its own, is never stopped."""
+    """Whether the keys in the panel can be used; scripts pass their own keys and are never stopped here."""
     if context.region is None or context.region.type != 'UI':
         return True
     obj = present(context.active_object)
@@ -58,7 +60,7 @@ def poll_chains(operator: type[bpy.types.Operator], context: bpy.types.Context) 
 
 
 def chosen_chain(obj: bpy.types.Object | None, slider: str) -> Chain:
-    """The in-betweens of a slider, the newest where the name is empty.
+    """The in-betweens of a slider; the newest if the name is empty.
 
     Raises
     ------

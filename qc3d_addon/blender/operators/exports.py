@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators that carry in-betweens into other programs and read them from USD files."""
+"""The operators that export in-betweens to other programs and read them from USD files."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -16,15 +16,15 @@ from ..kinds import present
 from .common import Status, end_previews, poll_active_object, poll_chains
 
 _FORMATS = (
-    ('.usdc', "USD", "In-betweens of blend shapes: Maya, Unreal, Houdini"),
-    ('.usda', "USD as Text", "The same in a file that can be read by people"),
-    ('.fbx', "FBX", "One channel with its shapes by weight: Maya, Unity"),
-    ('.glb', "glTF", "Targets with their weights animated: engines, viewers, VRM tools"),
+    ('.usdc', "USD", "Blend shapes with in-betweens: Maya, Unreal, Houdini"),
+    ('.usda', "USD as Text", "The same as a text file"),
+    ('.fbx', "FBX", "Blend-shape channels with in-between targets: Maya, Unity"),
+    ('.glb', "glTF", "Morph targets with animated weights: game engines, viewers, VRM tools"),
 )
 
 
 class QC3D_OT_export_in_betweens(bpy.types.Operator):
-    """Write the object with its shape keys, their in-betweens and the animation for other programs"""
+    """Export the object with its shape keys, their in-betweens and the animation for other programs"""
 
     bl_idname = "qc3d.export_in_betweens"
     bl_label = "Export In-Betweens"
@@ -43,11 +43,11 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
             default=";".join(f"*{ending}" for ending in export.SUFFIXES), options={'HIDDEN', 'SKIP_SAVE'}
         )
         format: EnumProperty(
-            name="Format", items=_FORMATS, description="Used where the name of the file has no ending"
+            name="Format", items=_FORMATS, description="File format; used if the file name has no extension"
         )
         density: IntProperty(
             name="Shapes",
-            description="In-betweens of each key in USD and FBX, whose readers go straight from one to the next",
+            description="In-betweens per key in USD and FBX; vertices move on straight lines between them",
             default=export.DENSITY,
             min=1,
             max=99,
@@ -63,7 +63,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
         return {'RUNNING_MODAL'}
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Let the name follow the format that is chosen in the file browser."""
+        """Change the extension of the file name to the format chosen in the file browser."""
         path = Path(self.filepath)
         if path.suffix == self.format or path.suffix not in export.SUFFIXES:
             return False
@@ -86,7 +86,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
 
 
 class QC3D_OT_read_usd(bpy.types.Operator):
-    """Give shape keys the in-betweens that a USD file has of their names; Blender's own import drops them"""
+    """Read the in-betweens of shape keys of the same names from a USD file; Blender's own import drops them"""
 
     bl_idname = "qc3d.read_usd"
     bl_label = "Read In-Betweens from USD"

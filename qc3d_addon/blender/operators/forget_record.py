@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that lets go of a record of earlier bakes that cannot be read."""
+"""The operator that deletes an unreadable record of earlier bakes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .common import Status, poll_active_object
 
 
 class QC3D_OT_forget_record(bpy.types.Operator):
-    """Forget the damaged record, so that you can bake anew; shape keys and sliders of earlier bakes stay as they are"""
+    """Delete the damaged record so that you can bake again; shape keys and sliders of earlier bakes stay as they are"""
 
     bl_idname = "qc3d.forget_record"
     bl_label = "Forget Damaged Record"
@@ -30,5 +30,5 @@ class QC3D_OT_forget_record(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Status:
         bookkeeping.forget_all(present(context.active_object))
-        self.report({'INFO'}, "The record is gone; the keys and sliders of earlier bakes are yours now.")
+        self.report({'INFO'}, "The record was deleted; keys and sliders of earlier bakes stay as ordinary ones.")
         return {'FINISHED'}

@@ -22,7 +22,7 @@ from .common import SLIDER, Status, chosen_chain, poll_chains
 
 
 class QC3D_OT_heat_map(bpy.types.Operator):
-    """Show by colours where the in-betweens are stretched, or hide that again"""
+    """Color the mesh by how much the in-betweens stretch it, or hide the colors again"""
 
     bl_idname = "qc3d.heat_map"
     bl_label = "Heat Map"
@@ -36,7 +36,7 @@ class QC3D_OT_heat_map(bpy.types.Operator):
         slider: SLIDER
         measure: EnumProperty(
             name="Measure",
-            description="What the colours show",
+            description="What the colors show",
             items=MEASURE_ITEMS,
             default="stretch",
             options={"SKIP_SAVE"},
@@ -45,7 +45,7 @@ class QC3D_OT_heat_map(bpy.types.Operator):
             name="Show",
             description="Whether to show the heat map",
             items=[
-                ("toggle", "Toggle", "Hide it where it is shown, else show it"),
+                ("toggle", "Toggle", "Hide it if it is shown, otherwise show it"),
                 ("on", "On", "Show it"),
                 ("off", "Off", "Hide it"),
             ],
@@ -76,7 +76,7 @@ class QC3D_OT_heat_map(bpy.types.Operator):
 
 
 class QC3D_OT_select_worst(bpy.types.Operator):
-    """Go to where the in-betweens stretch or shrink most beyond their keys: slider, cursor and selection"""
+    """Move slider, 3D cursor and selection to where the in-betweens stretch or shrink most beyond their keys"""
 
     bl_idname = "qc3d.select_worst"
     bl_label = "Select Worst Place"
@@ -100,7 +100,7 @@ class QC3D_OT_select_worst(bpy.types.Operator):
         stays = control_of(obj, chain).put(worst.at)
         if stays is not None:
             self.report({"WARNING"}, stays)
-        # The in-between nearest to it becomes active: Edit and Sculpt Mode then show and change that one.
+        # Make the nearest in-between the active key, so that Edit and Sculpt Mode show and change it.
         steps = owned_keys(keys, chain)
         if steps:
             nearest = min(steps, key=lambda step: abs(chain.places[step] - worst.at))
@@ -117,7 +117,7 @@ class QC3D_OT_select_worst(bpy.types.Operator):
 
 
 def _worst_place(obj: bpy.types.Object, chain: Chain) -> WorstPlace:
-    """Where to go; raises InputError where that is not known, or the slider cannot go anywhere."""
+    """The worst place of a chain; raises InputError if it is unknown or the slider cannot be set."""
     worst = None if chain.result is None else chain.result.worst
     if worst is None or worst.vertex >= len(mesh_of(obj).vertices):
         raise InputError(f"The in-betweens of '{chain.slider}' were not measured on this mesh; re-bake them.")

@@ -16,7 +16,7 @@ from .common import Status, poll_active_object
 
 
 class QC3D_OT_add_inner_key(bpy.types.Operator):
-    """Go through one more shape key on the way"""
+    """Add a shape key for the motion to go through"""
 
     bl_idname = "qc3d.add_inner_key"
     bl_label = "Add Key Between"
@@ -32,7 +32,7 @@ class QC3D_OT_add_inner_key(bpy.types.Operator):
 
 
 class QC3D_OT_remove_inner_key(bpy.types.Operator):
-    """Do not go through this shape key"""
+    """Remove this shape key from the motion"""
 
     bl_idname = "qc3d.remove_inner_key"
     bl_label = "Remove Key Between"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
-    """Show every moment of the motion while the slider is dragged, not only the baked ones; again to switch it off"""
+    """Show the exact motion at every position of the slider, not only the baked ones; click again to switch it off"""
 
     bl_idname = "qc3d.live_scrub"
     bl_label = "Live Scrub"
@@ -52,10 +52,10 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
         assert outcome.bake is not None
         pairs = len(plan.request.keys) - 1
         live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.frame_options.easing))
-        return [f"Drag the slider '{chain.slider}': it shows every moment now."]
+        return [f"Drag the slider '{chain.slider}': it now shows the exact motion."]
 
     def _switched_off(self, context: bpy.types.Context) -> Status | None:
-        """Switch the preview off where it is on for this slider; None where it is not."""
+        """Switch the preview off; None unless it was on for this slider."""
         is_same = live_scrub.is_on(context.active_object, self.slider)
         live_scrub.end()
         return {'FINISHED'} if is_same else None

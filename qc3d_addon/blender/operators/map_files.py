@@ -27,7 +27,7 @@ else:
 
 
 class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
-    """Save the map that these in-betweens were made from, for the same mesh in another file"""
+    """Save the map of these in-betweens to a file, to use it for the same mesh in another .blend file"""
 
     bl_idname = "qc3d.save_map"
     bl_label = "Save Map"
@@ -54,13 +54,13 @@ class QC3D_OT_save_map(ChainWork, bpy.types.Operator):
         return {'RUNNING_MODAL'}
 
     def work(self, context: bpy.types.Context, obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:
-        path = _path(self.filepath, "write to")
+        path = _path(self.filepath, "write")
         count = map_files.save_maps(obj, chain, path)
         return [f"{path.name} has {'the map' if count == 1 else f'{count} maps'} of '{chain.slider}'."]
 
 
 class QC3D_OT_load_map(bpy.types.Operator):
-    """Load maps that were saved for the same mesh and shape keys: the next bake of these keys only makes frames"""
+    """Load a map that was saved for the same mesh and shape keys, so that the next bake need not compute it"""
 
     bl_idname = "qc3d.load_map"
     bl_label = "Load Map"
@@ -88,10 +88,10 @@ class QC3D_OT_load_map(bpy.types.Operator):
         except QC3DError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
-        # A map serves bakes with the choices it was made with; the panel shows them from now on.
+        # A map can be used only with the options that it was made with, so the panel takes them over.
         fill_panel(settings_of(obj), loaded.through, loaded.options)
         names = " to ".join(f"'{name}'" for name in loaded.through)
-        self.report({'INFO'}, f"The map from {names} is ready; the panel has its choices.")
+        self.report({'INFO'}, f"The map from {names} is ready; the panel shows its options.")
         return {'FINISHED'}
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that makes the maps between keys ahead of baking."""
+"""The operator that computes the maps between keys before baking."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):
-    """Make the maps between the shape keys anew and keep them, so that later bakes only make frames"""
+    """Compute the map between the shape keys again and keep it, so that later bakes take less time"""
 
     bl_idname = "qc3d.prepare"
     bl_label = "Prepare"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an object can be baked at all, and the sentence to say where it cannot."""
+"""Checks whether an object can be baked; each returns or raises a sentence for the user."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .records import Chain
 
 
 def object_problem(obj: bpy.types.Object | None) -> str | None:
-    """Why nothing can be baked on ``obj``, or None. Quick enough for a button that is drawn all the time."""
+    """Why ``obj`` cannot be baked, or None. Fast enough for every redraw of a button."""
     if obj is None:
         return "There is no active object; select a mesh with shape keys."
     if obj.type != 'MESH':
@@ -36,14 +36,14 @@ def object_problem(obj: bpy.types.Object | None) -> str | None:
         if other is not None:
             return f"'{other.name}', which shares its mesh, is being edited; go back to Object Mode first."
     if keys is None or len(keys.key_blocks) < 2:
-        return f"'{obj.name}' has fewer than two shape keys; add a second one to go to."
+        return f"'{obj.name}' has fewer than two shape keys; add a second one."
     if not keys.use_relative:
-        return f"The shape keys of '{obj.name}' are absolute; switch on Relative, which the slider needs."
+        return f"The shape keys of '{obj.name}' are absolute; enable Relative, which in-betweens need."
     return None
 
 
 def require_object(obj: bpy.types.Object | None) -> bpy.types.Object:
-    """``obj`` itself where it can be baked; raises InputError where it cannot."""
+    """``obj`` itself if it can be baked; raises InputError otherwise."""
     problem = object_problem(obj)
     if problem is not None:
         raise InputError(problem)
@@ -52,7 +52,7 @@ def require_object(obj: bpy.types.Object | None) -> bpy.types.Object:
 
 
 def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
-    """Why names, from the first key to the last, are not shape keys of ``keys`` to go through, or None."""
+    """Why no in-betweens can go through the keys of these names, in this order, or None."""
     for number, name in enumerate(names):
         which = _which(number, len(names))
         if not name:
@@ -68,17 +68,17 @@ def keys_problem(keys: bpy.types.Key, names: Sequence[str]) -> str | None:
 
 
 def chain_problem(keys: bpy.types.Key, chain: Chain) -> str | None:
-    """Why a chain cannot be made again, or None: the keys that it goes through are not all there."""
+    """Why a chain cannot be baked again, or None: keys that it goes through may be missing."""
     lost = next((name for name in chain.through if name not in keys.key_blocks), None)
     if lost is None:
         return None
     if chain.mirror_of:
         return f"'{chain.slider}' is the mirror image of '{chain.mirror_of}'; mirror that one again."
-    return f"Shape key '{lost}' was renamed or deleted; give it its name back to re-bake, or bake anew."
+    return f"Shape key '{lost}' was renamed or deleted; restore its name to re-bake, or make a new bake."
 
 
 def chains_problem(obj: bpy.types.Object) -> str | None:
-    """Why ``obj`` has no in-betweens to work on, or None. Quick enough for a button that is drawn all the time."""
+    """Why ``obj`` has no in-betweens to work on, or None. Fast enough for every redraw of a button."""
     state = records.state(keys_of(obj))
     if state.problem is None and not state.chains:
         return f"'{obj.name}' has no in-betweens yet; bake some first."
@@ -86,27 +86,27 @@ def chains_problem(obj: bpy.types.Object) -> str | None:
 
 
 def require_keys(keys: bpy.types.Key, names: Sequence[str]) -> None:
-    """Raise InputError unless the names are shape keys of ``keys`` to go through."""
+    """Raise InputError unless in-betweens can go through the keys of these names."""
     problem = keys_problem(keys, names)
     if problem is not None:
         raise InputError(problem)
 
 
 def control_problem(keys: bpy.types.Key, names: Sequence[str], base: str) -> str | None:
-    """Why the value of the last of these keys cannot play in-betweens from ``base``, the first, or None."""
+    """Why the value of the last of these keys cannot play in-betweens that start at ``base``, or None."""
     key = keys.key_blocks[names[-1]]
     if key == keys.reference_key:
-        return f"'{key.name}' is the Basis, which has no value; play them on a slider of their own."
+        return f"'{key.name}' is the Basis, which has no value; set Play On to Slider."
     if key.relative_key.name != base:
         return (
-            f"'{key.name}' is relative to '{key.relative_key.name}', not to '{base}'; start from that key, or play "
-            "them on a slider of their own."
+            f"'{key.name}' is relative to '{key.relative_key.name}', not to '{base}'; start from that key, or set "
+            "Play On to Slider."
         )
     return None
 
 
 def require_control(keys: bpy.types.Key, names: Sequence[str], base: str) -> None:
-    """Raise InputError where a base is named and the last of the keys cannot play in-betweens from it."""
+    """Raise InputError if a base is named and the last of the keys cannot play in-betweens from it."""
     require_keys(keys, names)
     problem = control_problem(keys, names, base) if base else None
     if problem is not None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The distortion of a bake's frames, kept small with the shape keys until a heat map asks for it."""
+"""The distortion measures of a bake, stored compactly with the shape keys for the heat map."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .records import PROPERTY
 
 MEASURES = ("stretch", "volume", "dilatation")
 
-_HEADER = struct.Struct("<4sII")  # what it is, number of frames, number of vertices
+_HEADER = struct.Struct("<4sII")  # magic number, number of frames, number of vertices
 _MAGIC = b"QCM1"
 
 Measures = dict[str, NDArray[np.float32]]
 
 
 def keep(keys: bpy.types.Key, slider: str, measures: Measures, undo: ExitStack) -> None:
-    """Keep measures (k, n) by name, rounded to a thousandth or so; all are ratios of 0 or more."""
+    """Store measures (k, n) by name; they are ratios, stored as half-precision logarithms, to about a thousandth."""
     count, vertices = measures[MEASURES[0]].shape
     logarithms = np.log2(np.clip(np.stack([measures[name] for name in MEASURES]), 2.0**-20, 2.0**20))
     data = zlib.compress(np.ascontiguousarray(logarithms, dtype="<f2").tobytes(), 6)
@@ -34,7 +34,7 @@ def keep(keys: bpy.types.Key, slider: str, measures: Measures, undo: ExitStack) 
 
 
 def read(keys: bpy.types.Key, slider: str, vertices: int) -> Measures | None:
-    """What was kept for a slider, None where there is nothing that fits a mesh of so many vertices."""
+    """The measures of a slider; None if there are none for a mesh with this number of vertices."""
     data = keys.get(_property(slider))
     if not isinstance(data, bytes) or len(data) < _HEADER.size:
         return None
@@ -54,12 +54,12 @@ def read(keys: bpy.types.Key, slider: str, vertices: int) -> Measures | None:
 
 
 def forget(keys: bpy.types.Key, slider: str, undo: ExitStack) -> None:
-    """Remove what was kept for a slider."""
+    """Remove the measures of a slider."""
     id_properties.remove(keys, _property(slider), undo)
 
 
 def has(keys: bpy.types.Key, slider: str) -> bool:
-    """Whether something is kept for a slider. Quick enough for a panel."""
+    """Whether there are measures of a slider. Fast enough for a panel."""
     return id_properties.has(keys, _property(slider))
 
 

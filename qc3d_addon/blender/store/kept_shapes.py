@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake wrote into its shape keys, kept with them, so that the next one knows what was sculpted since."""
+"""The shapes that a bake wrote, stored with the shape keys so that the next bake knows what was sculpted since."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from . import id_properties
 from .names import MAX_STEPS
 from .records import PROPERTY
 
-_HEADER = struct.Struct("<4sII")  # what it is, number of shapes, number of vertices
+_HEADER = struct.Struct("<4sII")  # magic number, number of shapes, number of vertices
 _MAGIC = b"QCS1"
 
 Shape = NDArray[np.float32]
-# By the place on the control, which stays with a key where a bake changes the number of steps.
+# By the place on the control, since the number of a step changes with the number of steps.
 Shapes = dict[float, Shape]
 
 
 def keep(keys: bpy.types.Key, chain: str, base: Shape, shapes: Shapes, undo: ExitStack) -> None:
-    """Keep shapes (n, 3) by place, bit for bit, and that of the key which they are relative to."""
+    """Store shapes (n, 3) by place, bit for bit, and the shape (n, 3) of the key that they are relative to."""
     stacked = np.ascontiguousarray([base, *shapes.values()], dtype="<f4").view("<u4")
-    stacked[1:] ^= stacked[:1]  # most of a mesh stands still, and becomes zeros
+    stacked[1:] ^= stacked[:1]  # most vertices do not move and become zeros, which compress well
     data = np.array(list(shapes), dtype="<f8").tobytes() + zlib.compress(stacked.tobytes(), 6)
     id_properties.put(keys, _property(chain), _HEADER.pack(_MAGIC, len(shapes), len(base)) + data, undo)
 
 
 def read(keys: bpy.types.Key, chain: str, vertices: int) -> tuple[Shape, Shapes] | None:
-    """What ``keep`` kept for a chain, None where there is nothing that fits a mesh of so many vertices."""
+    """The base and the shapes of a chain; None if there are none for a mesh with this number of vertices."""
     data = keys.get(_property(chain))
     if not isinstance(data, bytes) or len(data) < _HEADER.size:
         return None
@@ -57,7 +57,7 @@ def read(keys: bpy.types.Key, chain: str, vertices: int) -> tuple[Shape, Shapes]
 
 
 def forget(keys: bpy.types.Key, chain: str, undo: ExitStack) -> None:
-    """Remove what was kept for a chain."""
+    """Remove the shapes of a chain."""
     id_properties.remove(keys, _property(chain), undo)
 
 

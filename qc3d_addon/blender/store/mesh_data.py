@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 
 def read_pairs(obj: bpy.types.Object, names: Sequence[str], base: str = "") -> dict[Ends, KeyPair]:
-    """The pairs of shape keys that follow each other in ``names``, checked, by their names.
+    """The pairs of consecutive shape keys in ``names``, checked, by the names of their keys.
 
-    Keys with a vertex group are taken as they show; one that others are relative to, ``base``, as it is.
-    Where Mirror modifiers show the mesh as one half, they are those of the mirrored whole.
+    A key with a vertex group is read as it appears when its value is 1, except ``base``, which is read as it is
+    stored. If Mirror modifiers complete the mesh, the pairs are those of the whole.
 
     Raises
     ------
     InputError
-        If they are not shape keys of the mesh, or their coordinates cannot be used.
+        If a name is not a shape key of the mesh, or coordinates cannot be used.
     """
     from ...solver.keys.keypair import consecutive_pairs
 
@@ -41,19 +41,19 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str], base: str = "") -> d
 
 
 def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
-    """(n, 3) float32: the absolute positions that a shape key of the object's mesh holds.
+    """(n, 3) float32 absolute positions that a shape key of the object's mesh stores.
 
     Raises
     ------
     InputError
-        If the key holds another number of points than the mesh has vertices.
+        If the number of points of the key differs from the number of vertices.
     """
     mesh = mesh_of(obj)
     points = keys_of(obj).key_blocks[name].points
     if len(points) != len(mesh.vertices):
         raise InputError(
             f"Shape key '{name}' has {len(points)} points but the mesh has {len(mesh.vertices)} vertices; "
-            "enter and leave Edit Mode once to bring them together."
+            "enter and leave Edit Mode once to repair the key."
         )
     coordinates = np.empty(3 * len(points), dtype=np.float32)
     points.foreach_get("co", coordinates)
@@ -61,19 +61,19 @@ def key_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
 
 
 def shown_coordinates(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
-    """(n, 3) float32: the positions of a shape key as it shows over what it is relative to, with its vertex group.
+    """(n, 3) float32 positions of a shape key as it appears when its value is 1: limited by its vertex group.
 
     Raises
     ------
     InputError
-        If the key holds another number of points than the mesh has vertices.
+        If the number of points of the key differs from the number of vertices.
     """
     keys = keys_of(obj)
     group = keys.key_blocks[name].vertex_group
     coordinates = key_coordinates(obj, name)
     if not group or group not in obj.vertex_groups:
         return coordinates
-    # Blender itself mixes it, on a copy that is in no scene.
+    # Let Blender itself mix the key, on a copy that is in no scene.
     copy = obj.copy()
     mesh = copy.data = mesh_of(obj).copy()
     try:
@@ -97,7 +97,7 @@ def set_key_coordinates(key: bpy.types.ShapeKey, coordinates: NDArray[np.float32
 
 
 def triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """(m, 3): the mesh's faces as Blender triangulates them."""
+    """(m, 3) vertex indices of the mesh's faces, as Blender triangulates them."""
     mesh.calc_loop_triangles()
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
@@ -105,7 +105,7 @@ def triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
 
 
 def polygons(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """(m,): the face that each of the ``triangles`` belongs to."""
+    """(m,) index of the face that each of the ``triangles`` belongs to."""
     mesh.calc_loop_triangles()
     owners = np.empty(len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("polygon_index", owners)
@@ -113,7 +113,7 @@ def polygons(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
 
 
 def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """(e, 2): the edges that belong to no face."""
+    """(e, 2) vertex indices of the edges that belong to no face."""
     ends = np.empty(2 * len(mesh.edges), dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)
     edge_of_corner = np.empty(len(mesh.loops), dtype=np.int32)

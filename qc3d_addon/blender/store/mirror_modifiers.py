@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The planes across which Mirror modifiers show a mesh again."""
+"""The mirror planes of an object's Mirror modifiers."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from ...solver.errors import InputError
 if TYPE_CHECKING:
     from ...solver.keys.halves import MirrorPlane
 
-# Of the mesh's size, where copies on the plane are not merged: coordinates that are meant to be 0.
+# Relative to the size: tolerance for vertices on the plane if the modifier does not merge.
 _ON_PLANE = 1e-6
 
 
 def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
-    """The planes of the Mirror modifiers that are on in the viewport, in the object's own space, in their order.
+    """The planes of the Mirror modifiers that the viewport shows, in the object's own space, in their order.
 
-    An axis that is bisected is left out: what is across it is cut away, so the mesh is more than one half.
+    Bisected axes are left out: the modifier cuts off the other side, so the mesh itself has more than one half.
 
     Raises
     ------
     InputError
-        If an object has no size along an axis, so that nothing can be mirrored across it.
+        If an object has the scale 0 along an axis, so that it has no mirror plane.
     """
     planes = []
     for modifier in obj.modifiers:
@@ -42,7 +42,7 @@ def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
 def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int) -> MirrorPlane:
     from ...solver.keys.halves import MirrorPlane
 
-    # A vertex is merged with its image, which is twice as far from it as the plane is.
+    # A vertex is merged with its image if their distance, twice that from the plane, is below the threshold.
     reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * max(obj.dimensions[:])
     if modifier.mirror_object is None:
         return MirrorPlane.across(axis, reach)
@@ -52,10 +52,10 @@ def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int)
         normal = np.linalg.inv(seen)[axis, :3]
     except np.linalg.LinAlgError as error:
         raise InputError(
-            f"'{obj.name}' or its mirror object '{modifier.mirror_object.name}' has no size along an axis; nothing can "
-            f"be mirrored by '{modifier.name}'. Give it a scale other than 0."
+            f"'{obj.name}' or its mirror object '{modifier.mirror_object.name}' has the scale 0 along an axis, so "
+            f"'{modifier.name}' cannot mirror it; set another scale."
         ) from error
-    # Scaled so that heights over the plane are distances along the direction.
+    # Scale the normal so that its dot product measures distances along the mirror direction.
     length = float(np.linalg.norm(seen[:3, axis]))
     normal, direction = normal * length, seen[:3, axis] / length
     return MirrorPlane(tuple(normal.tolist()), tuple(direction.tolist()), float(normal @ seen[:3, 3]), reach)

@@ -8,21 +8,21 @@ from collections.abc import Container, Sequence
 
 LIMIT = 63
 MAX_STEPS = 999
-# Names can be typed, and become no others where files allow letters, digits and underscores only.
+# Only ASCII letters and underscores: easy to type, and valid in files that allow only letters, digits and underscores.
 BETWEEN = "_to_"
 LEFT_OUT = "__"
 
 # Room after a label for the longest place, and for the ".001" that Blender adds to a name in use.
 _AFTER_LABEL = len("_99_9") + len(".001")
-_LEAST_ROOM = 9  # bytes of a name that still tell keys apart; with less for each, only the first and the last are named
+_LEAST_ROOM = 9  # bytes per name; with less, shortened names look alike, so only the first and the last key are named
 
 
 def chain_label(keys: Sequence[str], taken: Container[str], mark: str = "") -> str:
-    """The name of the slider that goes through two keys or more, and the start of the names of its shape keys.
+    """The name of the slider for two or more keys, which is also the start of the names of its shape keys.
 
-    It reads "first_to_second_to_third". Long names lose their middle, because variants of one name usually differ at an
-    end; where there are too many keys the inner ones become "__"; a label that is taken gets a number.
-    ``mark`` comes behind it.
+    It has the form "first_to_second_to_third". Long names are shortened in their middle, because variants of a name
+    usually differ at an end; with too many keys, the inner ones become "__"; a label in use gets a number.
+    ``mark`` is appended.
     """
     number = 1
     while True:
@@ -34,9 +34,9 @@ def chain_label(keys: Sequence[str], taken: Container[str], mark: str = "") -> s
 
 
 def key_name(label: str, step: int, places: Sequence[float]) -> str:
-    """The name of the shape key at a step, by its place in hundredths: "Smile_25" for the first of three in-betweens.
+    """The name of the shape key at a step, with its place in percent: "Smile_25" for the first of three in-betweens.
 
-    Where two places are nearer to each other than that, it has tenths of a hundredth too: "Smile_33_3".
+    If two places have the same percentage, it has tenths of a percent too: "Smile_33_3".
     """
     if len({round(100.0 * place) for place in places}) == len(places):
         return f"{label}_{round(100.0 * places[step]):02d}"

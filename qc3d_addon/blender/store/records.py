@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What QC3D remembers about its own work, kept with the shape keys it belongs to.
+"""The record of a mesh's bakes, stored with its shape keys.
 
-The record is an ID property of the shape keys' data block, so it is saved, copied and undone with them: which keys a
-bake made (never guessed from names), and the prepared map of each pair of keys. A file comes from anywhere: whatever is
-read is checked, types and ranges, before anything is done with it.
+The record is a custom property of the shape keys' data block, so that it is saved, copied and undone with them. It says
+which keys a bake made, which is never guessed from names, and which maps are stored. Files come from anywhere, so the
+types and ranges of everything that is read are checked before it is used.
 """
 
 from __future__ import annotations
@@ -31,51 +31,51 @@ if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
 
 PROPERTY = "qc3d"
-# Of what is written. Records of version 1, and from before there was a number, have a number of even steps, with hats
-# over them, in place of places and corners.
+# Version of the format that is written. In records of version 1, and of no version, chains have ``intervals``, a number
+# of even steps with hat functions, instead of places and corners.
 VERSION = 2
 
-LEAST_DISTANCE = 1e-5  # between two places
-_MOST_FRAME = 2**31  # from 0, either way
-_LONGEST_KEY = 2 * LIMIT  # bytes: a mirror image goes through keys of names made up for it
+LEAST_DISTANCE = 1e-5  # smallest difference between two places
+_MOST_FRAME = 2**31  # largest absolute value of a frame number
+_LONGEST_KEY = 2 * LIMIT  # bytes; a mirror image may have invented key names, longer than Blender's limit
 _LONGEST_FINGERPRINT = 1000
 _LONGEST_DIGEST = 64
 
 
 class DamagedRecordError(InputError):
-    """The record is not what any version writes."""
+    """The record is damaged: no version of QC3D writes it like this."""
 
 
 @dataclass
 class Chain:
-    """One baked pair or row of keys: its slider and the shape keys that the slider plays.
+    """A baked sequence of keys: its control and the shape keys that the control plays.
 
     Parameters
     ----------
     through
-        Names of the user's own keys that the slider goes through, from the first to the last.
+        Names of the user's own keys that the motion goes through, from the first to the last.
     slider
-        Name of the custom property that plays the chain.
+        Name of the custom property that plays the chain, and name of the chain.
     places
-        Positions of the control at which it shows one shape alone, from 0 (the first key, step 0) to 1 (the last key).
+        Values of the control at which it shows a single shape, from 0 (step 0, the first key) to 1 (the last key).
     corners
-        Steps at which the path between the shapes turns: all inner ones where it goes straight from shape to shape.
+        Steps at which the path through the shapes is not smooth: all inner ones if it is piecewise linear.
     keys
-        Generated shape keys: their names by step.
+        Names of the generated shape keys, by step.
     keyframes
         First and last frame of the keyframes that a bake put on the slider, or None.
     request
-        What the newest bake was asked for, as plain values; empty for those of older versions. Only
-        ``BakeRequest.again`` looks into it.
+        The request of the newest bake, as plain values; empty for bakes of older versions. Only ``BakeRequest.again``
+        reads it.
     result
-        What the panel shows of the newest bake, None for those of older versions.
+        The results of the newest bake that the panel shows; None for bakes of older versions.
     on_key
-        Name of the user's key whose value plays the chain, the last of ``through``; empty where a slider of its own
-        does. ``slider`` is then only what the chain is called.
+        Name of the user's key whose value plays the chain, the last of ``through``; empty if a slider does. If it is
+        not empty, ``slider`` is only the name of the chain.
     digests
-        What tells the shapes of the keys ``through`` at the newest bake; empty for those of older versions.
+        Hashes of the shapes of the keys ``through`` at the newest bake; empty for bakes of older versions.
     mirror_of
-        Slider of the chain that this one is the mirror image of; empty where it was baked from keys of its own.
+        Slider of the chain that this one is the mirror image of; empty if it was baked from its own keys.
     """
 
     through: tuple[str, ...]
@@ -121,17 +121,17 @@ class Chain:
 
     @property
     def base(self) -> str:
-        """Name of the key that the one which plays the chain is relative to; empty where there is a slider."""
+        """Name of the key that the playing key is relative to; empty if a slider plays the chain."""
         return self.through[0] if self.on_key else ""
 
     @property
     def mode(self) -> str:
-        """The mode of the newest bake; empty where that is not known."""
+        """The mode of the newest bake; empty if unknown."""
         return self._setting("mode")
 
     @property
     def easing(self) -> Easing:
-        """The easing of the newest bake; linear where that is not known."""
+        """The easing of the newest bake; linear if unknown."""
         return next((known for known in get_args(Easing) if known == self._setting("easing")), "linear")
 
     def _setting(self, name: str) -> str:
@@ -141,12 +141,12 @@ class Chain:
 
     @property
     def intervals(self) -> int:
-        """Number of steps from the first key to the last."""
+        """Number of intervals between the steps."""
         return len(self.places) - 1
 
     @property
     def weights(self) -> Weights:
-        """What the control plays: how much of each step's shape at each of its positions."""
+        """The weights of the steps' shapes as functions of the control."""
         from ...solver.frames.weights import Weights  # scipy would make Blender start slower
 
         return Weights.smooth(self.places, self.corners)
@@ -154,7 +154,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class KeptMap:
-    """Where the prepared map of a pair is kept, and what it was made from."""
+    """The entry of a stored map: its pair of keys, and a fingerprint of what it was made from."""
 
     from_key: str
     to_key: str
@@ -175,19 +175,19 @@ class KeptMap:
 
 @dataclass
 class Record:
-    """Everything remembered about one mesh's shape keys."""
+    """The record of one mesh's shape keys: its chains and the entries of its stored maps."""
 
     chains: list[Chain] = field(default_factory=list)
     maps: list[KeptMap] = field(default_factory=list)
 
     @classmethod
     def read(cls, keys: bpy.types.Key) -> Record:
-        """The record of ``keys``; empty where nothing was baked yet.
+        """The record of ``keys``; empty if nothing has been baked yet.
 
         Raises
         ------
         InputError
-            If the record is damaged (DamagedRecordError), or a later version wrote it.
+            If the record is damaged (DamagedRecordError) or was written by a later version.
         """
         text = keys.get(PROPERTY)
         if text is None:
@@ -214,19 +214,19 @@ class Record:
         except (ValueError, KeyError, TypeError) as error:
             raise DamagedRecordError(
                 f"The record of earlier bakes on '{owner}' is damaged; press Forget Damaged Record under Baked "
-                "In-Betweens, which keeps all shape keys and sliders, then bake anew."
+                "In-Betweens, which keeps all shape keys and sliders, then bake again."
             ) from error
         return cls(chains, maps)
 
     def _follow(self, keys: bpy.types.Key) -> None:
-        """Take the names that keys of chains have now where they were renamed; their maps are made again."""
+        """Update the names of keys that were renamed; their maps will be computed again."""
         for chain in self.chains:
             names = renamed(keys, chain.through, chain.digests, chain.on_key, chain.keys.values())
             chain.through = tuple(names.get(name, name) for name in chain.through)
             chain.on_key = names.get(chain.on_key, chain.on_key)
 
     def write(self, keys: bpy.types.Key, undo: ExitStack) -> None:
-        """Keep the record with ``keys``, without the maps of keys that no longer exist; ``undo`` can take it back."""
+        """Store the record with ``keys``, without the maps of deleted keys; closing ``undo`` undoes that."""
         names = set(keys.key_blocks.keys())
         for kept in [kept for kept in self.maps if not {kept.from_key, kept.to_key} <= names]:
             self.maps.remove(kept)
@@ -236,34 +236,34 @@ class Record:
         id_properties.put(keys, PROPERTY, text, undo)
 
     def chain(self, through: tuple[str, ...], mode: str = "") -> Chain | None:
-        """The chain through these keys on a slider of its own, in this mode or any, if it was baked before."""
+        """The chain with a slider through these keys, in this mode or, by default, in any; None if not baked."""
         found = [chain for chain in self.chains if chain.through == through and not chain.on_key]
         return next((chain for chain in found if not mode or chain.mode in ("", mode)), None)
 
     def chain_on_key(self, name: str) -> Chain | None:
-        """The chain that the value of a key plays, if it was baked before."""
+        """The chain that the value of a key plays; None if not baked."""
         return next((chain for chain in self.chains if chain.on_key == name), None)
 
     def chain_of_slider(self, slider: str) -> Chain | None:
-        """The chain that a slider plays; the newest where the name is empty."""
+        """The chain of a slider; the newest if the name is empty."""
         if not slider:
             return self.chains[-1] if self.chains else None
         return next((chain for chain in self.chains if chain.slider == slider), None)
 
     def kept_map(self, keys: bpy.types.Key, wanted: KeptMap) -> bytes | None:
-        """The bytes of the map that was made from exactly what ``wanted`` names, if it is kept."""
+        """The bytes of the stored map with exactly this entry, or None."""
         data = keys.get(wanted.property_name) if wanted in self.maps else None
         return data if isinstance(data, bytes) else None
 
     def keep_map(self, keys: bpy.types.Key, kept: KeptMap, data: bytes, undo: ExitStack) -> None:
-        """Keep a map in place of an older one of the same pair; ``write`` must follow."""
+        """Store a map, replacing an older one of the same pair; ``write`` must follow."""
         self.maps = [other for other in self.maps if (other.from_key, other.to_key) != (kept.from_key, kept.to_key)]
         self.maps.append(kept)
         id_properties.put(keys, kept.property_name, data, undo)
 
 
 class State(NamedTuple):
-    """What there is to do with a record: the number of its chains, and what is wrong with it."""
+    """The state of a record: the number of its chains, and what is wrong with it."""
 
     chains: int
     problem: str | None = None
@@ -271,11 +271,11 @@ class State(NamedTuple):
 
 
 def state(keys: bpy.types.Key) -> State:
-    """Examine the record of ``keys``; quick enough for buttons that are drawn all the time."""
+    """The state of the record of ``keys``. Fast enough for every redraw of a button."""
     text = keys.get(PROPERTY)
     if text is None:
         return State(0)
-    # Anything but a text is damaged, whatever it says.
+    # Anything other than a string is damaged.
     return _state(text if isinstance(text, str) else "", keys.name)
 
 
@@ -288,7 +288,7 @@ def _state(text: str, owner: str) -> State:
 
 
 def _places(found: dict[str, Any]) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """The places and corners among a chain's values, which are taken out of them."""
+    """Remove the places and corners from a chain's values and return them."""
     if "intervals" in found:
         intervals = stored.whole(found.pop("intervals"), 1, MAX_STEPS)
         return tuple(step / intervals for step in range(intervals + 1)), tuple(range(1, intervals))
@@ -304,7 +304,7 @@ def _places(found: dict[str, Any]) -> tuple[tuple[float, ...], tuple[int, ...]]:
 
 
 def _request(values: object) -> dict[str, Any]:
-    """What a bake was asked for, as it is: plain values, and dictionaries and lists of plain values."""
+    """The stored request of a bake: plain values, and dictionaries and lists of plain values."""
     found = stored.plain_dict(values)
     for value in found.values():
         for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else (value,):

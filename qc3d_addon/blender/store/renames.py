@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of the user that were renamed since a bake: Blender lets drivers and curves follow, and so does the record."""
+"""Finds keys that the user has renamed since a bake: Blender updates drivers and F-curves, and QC3D its record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _VALUE = re.compile(r'key_blocks\["(.*)"\]\.value', re.DOTALL)
 
 
 def digest(key: bpy.types.ShapeKey) -> str:
-    """A short text that tells the shape of a key from others."""
+    """A short hash of the shape of a key."""
     values = np.empty(3 * len(key.points), dtype=np.float32)
     key.points.foreach_get("co", values)
     return hashlib.sha256(values.tobytes()).hexdigest()[:16]
@@ -24,17 +24,17 @@ def digest(key: bpy.types.ShapeKey) -> str:
 def renamed(
     keys: bpy.types.Key, through: Sequence[str], digests: Sequence[str], on_key: str, made: Iterable[str]
 ) -> dict[str, str]:
-    """The names that keys of a chain have now, by those that they had, where that can be told.
+    """The new names of the renamed keys of a chain, by their old names, as far as they can be found.
 
-    The key that plays a chain is the one that the chain's drivers read, and what it is relative to is known from
-    itself. Any other is the one key that has the shape which it had at the bake. Quick where no key is missing.
+    The key that plays a chain is the one that the chain's drivers read, and that key knows its base. Any other key is
+    found by its shape, if exactly one key has the shape of the bake. Fast if no key is missing.
 
     Parameters
     ----------
     through, digests, on_key
-        As ``Chain`` has them.
+        As in ``Chain``.
     made
-        Names of the keys that the chain's bake made.
+        Names of the keys that the bake of the chain made.
     """
     blocks, made = keys.key_blocks, list(made)
     found: dict[str, str] = {}
@@ -56,13 +56,14 @@ def renamed(
 
 
 def _read(keys: bpy.types.Key, made: Iterable[str]) -> str | None:
-    """Name of the key whose value the drivers of made keys read; None where there is none."""
+    """Name of the key whose value the drivers of generated keys read; None if there is none."""
     if keys.animation_data is None:
         return None
     for name in made:
         curve = keys.animation_data.drivers.find(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
         variables = [] if curve is None or curve.driver is None else list(curve.driver.variables)
-        if len(variables) != 1 or variables[0].type != 'SINGLE_PROP':
+        # Beside the value, at most whether the key is muted.
+        if len(variables) not in (1, 2) or variables[0].type != 'SINGLE_PROP':
             continue
         match = _VALUE.fullmatch(variables[0].targets[0].data_path)
         read = None if match is None else bpy.utils.unescape_identifier(match[1])

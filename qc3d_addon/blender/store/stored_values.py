@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of what custom properties hold: a .blend comes from anywhere, and any script may have changed it.
+"""Checks of stored values: a .blend file comes from anywhere, and any script may have changed it.
 
-Every function gives the value back where it is sound, and raises ValueError where it is not.
+Every function returns the value if it is valid, and raises ValueError otherwise.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ LONGEST_TEXT = 10_000
 
 
 def parse(text: object) -> dict[str, Any]:
-    """The JSON object that a custom property holds as its text."""
+    """The JSON object in the string of a custom property."""
     if not isinstance(text, str):
         raise ValueError("not a text")
     try:
@@ -28,21 +28,21 @@ def parse(text: object) -> dict[str, Any]:
 
 
 def plain_dict(value: object) -> dict[str, Any]:
-    """A dictionary, whatever is in it."""
+    """A dictionary with any contents."""
     if not isinstance(value, dict):
         raise ValueError("not a dictionary")
     return value
 
 
 def plain_list(value: object) -> list[Any]:
-    """A list, whatever is in it."""
+    """A list with any contents."""
     if not isinstance(value, list):
         raise ValueError("not a list")
     return value
 
 
 def whole(value: object, low: int, high: int) -> int:
-    """A whole number from ``low`` to ``high``; neither True nor False, which Python counts as such."""
+    """An int from ``low`` to ``high``, and no bool."""
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
         raise ValueError(f"not a whole number from {low} to {high}")
     return value
@@ -62,7 +62,7 @@ def number(value: object, low: float = -math.inf, high: float = math.inf) -> flo
 
 
 def text(value: object, most: int = LONGEST_TEXT) -> str:
-    """A text of at most ``most`` bytes that Blender can take: UTF-8 without a zero."""
+    """A string of at most ``most`` bytes that Blender accepts: valid UTF-8 without null characters."""
     if not isinstance(value, str) or "\0" in value:
         raise ValueError("not a text")
     if len(value.encode()) > most:  # raises UnicodeEncodeError, a ValueError, for half a surrogate pair

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is remembered of how a bake turned out, for the box that the panel draws of it."""
+"""The results of a bake that are stored for the panel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from . import stored_values as stored
 if TYPE_CHECKING:
     from ...solver.frames.report import BakeReport, PlayedReport
 
-_MOST = 2**63 - 1  # of what is counted
+_MOST = 2**63 - 1  # upper bound of counts
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class WorstPlace:
     Parameters
     ----------
     excess
-        How far, over the length in the nearer key; 0 where they do not.
+        By how much, relative to the length in the nearer key; 0 if nowhere.
     at
-        Position of the slider, 0..1.
+        Position of the slider, in [0, 1].
     vertex
         Index of a vertex.
     """
@@ -44,18 +44,19 @@ class WorstPlace:
 
 @dataclass(frozen=True)
 class Played:
-    """What a control plays between its shapes, the worst of many positions.
+    """Quality of what a control plays, also between its shapes: the worst values over many positions.
 
     Parameters
     ----------
     distance
-        How far a vertex is from where the computed motion has it, over the size.
+        Largest distance of a vertex from the computed motion, over the size.
     stretch
-        How far an edge leaves the interval between its lengths in the two keys.
+        Largest relative amount by which an edge leaves the interval between its lengths in the two keys.
     volume
-        How far an enclosed volume is from what lies between its two keys; None where nothing is closed.
+        Largest relative amount by which the enclosed volume leaves the interval between its values in the two keys;
+        None if the mesh is not closed.
     folds, crossings
-        As those of the in-betweens, at one position.
+        As in ``Summary``, at the worst position.
     """
 
     distance: float
@@ -66,7 +67,7 @@ class Played:
 
     @classmethod
     def of_report(cls, report: PlayedReport) -> Played:
-        """What there is to remember of the solver's report."""
+        """The values from the solver's report."""
         return cls(report.distance, report.worst_stretch, report.volume, report.folds, report.crossings)
 
     @classmethod
@@ -87,28 +88,29 @@ class Played:
 
 @dataclass(frozen=True)
 class Summary:
-    """How a bake turned out.
+    """The results of a bake.
 
     Parameters
     ----------
     count
         Number of in-betweens that became shape keys.
     engine
-        What filled the volume.
+        Engine that filled the volume with tetrahedra.
     seconds
-        How long the work took.
+        Time of the computation.
     folds
-        Number of inverted tetrahedra in all in-betweens; None where there was no map.
+        Number of inverted tetrahedra, summed over the in-betweens; None without a map.
     crossings
-        Number of pairs of triangles that cross in an in-between beyond those of its keys; None where it is not known.
+        Number of pairs of crossing triangles beyond those of the keys, summed over the in-betweens; None if unknown.
     worst
-        Where the in-betweens stretch or shrink most beyond their keys; None where that was not measured.
+        Where the in-betweens stretch or shrink most beyond their keys; None if not measured.
     residual
-        How far the map is from the second key before that is blended in, over the size; None without a map.
+        RMS distance of the map from the second key before the exact key is blended in, over the size; None without a
+        map.
     collider_crossings
-        Number of pairs of triangles that cross with colliders; None where there were none.
+        Number of pairs of triangles that cross with colliders, summed over the in-betweens; None without colliders.
     played
-        What the control plays between the in-betweens; None for those of older versions.
+        Quality of what the control plays, also between the in-betweens; None for bakes of older versions.
     notes
         Sentences for the user.
     """
@@ -126,7 +128,7 @@ class Summary:
 
     @classmethod
     def of_report(cls, report: BakeReport, places: Sequence[float], notes: Sequence[str]) -> Summary:
-        """The summary of the solver's ``report`` about shapes at these places of their control."""
+        """The results in the solver's ``report`` about shapes at these places of the control."""
         worst, played = report.worst_stretch, report.played
         return cls(
             count=len(places) - 2,
@@ -143,7 +145,7 @@ class Summary:
 
     @classmethod
     def from_json(cls, values: object) -> Summary | None:
-        """What ``dataclasses.asdict`` makes of it, None where there is none.
+        """The inverse of ``dataclasses.asdict``; None for None or an empty dictionary.
 
         Raises
         ------
@@ -168,5 +170,5 @@ class Summary:
 
 
 def _summed(counts: Sequence[int | None] | None) -> int | None:
-    """The sum over all shapes; None where nothing, or not everything, is known."""
+    """The sum over all shapes; None if any count is unknown."""
     return None if counts is None or None in counts else sum(count or 0 for count in counts)

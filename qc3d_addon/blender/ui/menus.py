@@ -15,7 +15,7 @@ _OTHER_WORDS = "(Breakdown, Tween)"  # what animators look for; Blender's search
 
 
 def _draw_keys(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """In the menu beside the list of shape keys: bake the active key, those selected, or all; split one."""
+    """Entries of the menu beside the list of shape keys: bake the active key, the selected ones, or all; split one."""
     layout = present(menu.layout)
     layout.separator()
     layout.operator(QC3D_OT_bake_inbetweens.bl_idname, icon='SHAPEKEY_DATA')
@@ -48,6 +48,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the entries away."""
+    """Remove the entries."""
     for menu, draw in _ENTRIES:
         menu.remove(draw)  # type: ignore[arg-type,unused-ignore]  # 5.2's: no menu

@@ -13,9 +13,9 @@ from .panels import IN_THE_SIDEBAR, QC3D_PT_inbetweens
 
 
 class QC3D_PT_exports(bpy.types.Panel):
-    """What carries in-betweens into other programs, and back."""
+    """Buttons that export in-betweens to other programs and read them back."""
 
-    bl_label = "Into Other Programs"
+    bl_label = "Other Programs"
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
     bl_category = "QC3D"

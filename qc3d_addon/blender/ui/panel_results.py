@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sub-panel below the choices: each slider with what its bake made."""
+"""The sub-panel of the bakes: each control with the results of its bake."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _MORE: tuple[tuple[type[bpy.types.Operator], IconItems], ...] = (
     (QC3D_OT_save_map, 'FILE_TICK'),
     (QC3D_OT_remove, 'TRASH'),
 )
-_STOPPED = "Blender stopped the drivers, since the slider had no value for a moment; re-bake to start them again."
+_STOPPED = "Blender stopped the drivers because the slider had no value (NaN) for a moment; re-bake to restart them."
 _PROBLEMS = {"folds": "folds", "crossings": "new crossings", "collider_crossings": "crossings with colliders"}
 
 
@@ -109,7 +109,7 @@ def _draw_chain(
         is_on = live_scrub.is_on(obj, chain.slider)
         buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
     is_straight = straight.is_on(keys_of(obj), chain)
-    buttons.operator(QC3D_OT_straight.bl_idname, icon='IPO_LINEAR', depress=is_straight).slider = chain.slider
+    layout.operator(QC3D_OT_straight.bl_idname, icon='IPO_LINEAR', depress=is_straight).slider = chain.slider
     if problem is not None and not chain.mirror_of:
         draw_sentence(context, layout, problem, 'ERROR')
     if chain.result is not None:
@@ -128,7 +128,7 @@ def _draw_chain(
 def _draw_double_motion(
     context: bpy.types.Context, layout: bpy.types.UILayout, obj: bpy.types.Object, chain: Chain, chains: list[Chain]
 ) -> None:
-    """What adds to what the control shows, as it is now, and the button that ends it where there is one."""
+    """Warnings about motion that adds to what the control shows, and the button that ends it if there is one."""
     found = double_motion(obj, chain, chains)
     for sentence in found:
         draw_sentence(context, layout, sentence, 'ERROR')
@@ -157,14 +157,14 @@ def _draw_result(
         facts.label(text=f"Plays the motion within {result.played.distance:.2%} of the size")
         facts.label(text=f"Lengths hold within {result.played.stretch:.1%}{volume}")
     if result.residual is None:
-        facts.label(text="Straight blend, without a map")
+        facts.label(text="Straight lines, without a map")
     else:
         facts.label(text=f"Fitted within {result.residual:.2%} of the size")
         facts.label(text=f"Engine {result.engine}")
 
 
 def _count(result: Summary, name: str) -> int | None:
-    """The most of a kind of problem, in the in-betweens and in what is played between them."""
+    """Largest count of one kind of problem, at the in-betweens and between them; None if unknown."""
     counts = [getattr(result, name), getattr(result.played, name, None)]
     return max((count for count in counts if count is not None), default=None)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel shows while a rig is active, as in Pose Mode: the sliders of the meshes that it moves."""
+"""The panel while a rig is active, as in Pose Mode: the sliders of the meshes that the rig moves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .panel_texts import draw_sentence
 
 
 def meshes_of(rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """The meshes in the scenes that a rig moves, by a modifier or as its children, in the order of their names."""
+    """The meshes that a rig moves, by a modifier or as its children, sorted by name."""
     children = set(rig.children_recursive)
     meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH' and obj.users_scene]
     return sorted((obj for obj in meshes if obj in children or _is_deformed(obj, rig)), key=lambda obj: obj.name)

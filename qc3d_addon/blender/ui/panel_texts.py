@@ -14,13 +14,13 @@ from ..kinds import present
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import IconItems
 
-_MARGINS, _LETTER = 85.0, 6.2  # tabs, borders and icon; a letter on average
+_MARGINS, _LETTER = 85.0, 6.2  # pixels: tabs, borders and icon; mean width of a letter
 
 
 def draw_sentence(
     context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: IconItems = 'INFO'
 ) -> None:
-    """Draw a sentence over as many lines as the width of the sidebar asks for; Blender would cut it."""
+    """Draw a sentence, wrapped to the width of the sidebar; Blender itself would cut it off."""
     region, preferences = present(context.region), present(context.preferences)
     points = region.width / preferences.system.ui_scale
     width = max(16, int((points - _MARGINS) / _LETTER))

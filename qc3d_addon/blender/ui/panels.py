@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in the 3D view's sidebar: the choices, the button, and how far the work is."""
+"""The panel in the 3D view's sidebar: the options, the button, and the progress."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..store import checks, records
 from . import panel_rig, presets
 from .panel_texts import draw_sentence
 
-# Else Blender asks the operators whether they can run as if the mouse were over the 3D view, not over this panel.
+# Otherwise Blender calls the operators' poll as if the mouse were over the 3D view, not over this panel.
 IN_THE_SIDEBAR: Literal['INVOKE_DEFAULT'] = 'INVOKE_DEFAULT'
 
 
@@ -75,7 +75,7 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
             return
         obj = present(obj)
         notice = engines.engine_notice() if settings_of(obj).engine != 'delaunay' else None
-        if notice is not None and not records.state(keys_of(obj)).chains:  # else it is said with what was baked
+        if notice is not None and not records.state(keys_of(obj)).chains:  # otherwise it stands with the results
             draw_sentence(context, layout, notice)
 
 
@@ -108,7 +108,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
 
 
 def _draw_keys(layout: bpy.types.UILayout, obj: bpy.types.Object, settings: ObjectSettings) -> None:
-    """A row for each key, in the order in which they are gone through."""
+    """A row for each key, in the order of the motion."""
     keys = keys_of(obj)
     column = layout.column()
     column.prop_search(settings, "first", keys, "key_blocks", icon='SHAPEKEY_DATA')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of the panel's choices: everything but what belongs to one character and shot."""
+"""Presets of the panel's options: all but those that belong to one character or shot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FOLDER = "qc3d"
 
 
 class QC3D_PT_presets(PresetPanel, bpy.types.Panel):
-    """The saved choices, behind the button in the panel's header."""
+    """The saved presets, behind the button in the panel's header."""
 
     bl_label = "Presets"
     preset_subdir = FOLDER
@@ -38,7 +38,7 @@ class QC3D_PT_presets(PresetPanel, bpy.types.Panel):
 
 
 class QC3D_OT_add_preset(AddPresetBase, bpy.types.Operator):  # type: ignore[misc]  # the first has no types
-    """Save the panel's choices under a name, or remove the preset of that name"""
+    """Save the panel's options as a preset, or remove the preset of that name"""
 
     bl_idname = "qc3d.add_preset"
     bl_label = "Add QC3D Preset"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which way round a part goes that turns by about half a turn: two keys tell that little, what is in the way does."""
+"""Chooses the direction of parts that turn by about half a turn: the one with fewer collisions."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from ..surface.path import SurfacePath
 
 _LOOKED_AT = (0.25, 0.5, 0.75)
 _SWEEPS = 4
-_AS_LONG = np.radians(10.0)
-# Parts that are tried the other way: each costs three more shapes.
-_MOST_TRIED = 8
+_AS_LONG = np.radians(10.0)  # from half a turn: both directions look equally long
+_MOST_TRIED = 8  # parts; each costs three more shapes
 
 
 def path_between(embedding: Embedding, options: FitOptions) -> SurfacePath:
     """The surface's path between the keys of a pair.
 
-    A part that crosses others on its way, and turns by about half a turn, goes the other way round where it crosses
-    less there: the page of a book turns over, not through the covers.
+    A part that turns by about half a turn and collides with others is turned in the other direction if it collides less
+    there: the page of a book turns over instead of passing through the covers.
     """
 
     def path(other_way: Ints) -> SurfacePath:
@@ -45,7 +44,7 @@ def path_between(embedding: Embedding, options: FitOptions) -> SurfacePath:
 
 
 def _crossings(limit: CrossingLimit, path: SurfacePath) -> tuple[int, Ints]:
-    """How often shapes on a path cross themselves beyond the keys, and which parts that turn half round do so."""
+    """Number of new crossings of shapes on a path, and the half-turned parts that are involved in them."""
     shapes = path.shapes([(time, None) for time in _LOOKED_AT], _SWEEPS)
     involved = np.logical_or.reduce([limit.new_vertices(shape) for shape in shapes])
     parts = path.half_turned
@@ -53,9 +52,9 @@ def _crossings(limit: CrossingLimit, path: SurfacePath) -> tuple[int, Ints]:
 
 
 def half_turned_parts(path: SurfacePath) -> int:
-    """How many parts, or whether everything as one, turn so nearly by half that the other way is as long."""
+    """Number of parts that turn so nearly by half a turn that both directions are equally long; 1 if the whole does."""
     if np.linalg.norm(path.whole_turn) > np.pi - _AS_LONG:
         return 1
     owners = path.components[path.vertices[path.deformation.faces[:, 0]]]
-    mean = np.linalg.norm(means_by_label(owners, path.turning.swing, path.deformation.weights), axis=1)
+    mean = np.linalg.norm(means_by_label(owners, path.turning.swing - path.rest, path.deformation.weights), axis=1)
     return int((np.abs(mean[path.half_turned] - np.pi) < _AS_LONG).sum())

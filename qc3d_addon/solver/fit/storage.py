@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fitted map as bytes: versioned, without pickles, checked on the way in."""
+"""Fitted maps as bytes: versioned, without pickles, and validated when they are read."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from .fitted_map import FittedMap
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 _SEAL_LENGTH = 32
 _DAMAGED = "The stored map is damaged; fit the keys again."
 _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)
 
 
 def fingerprint(pair: KeyPair) -> str:
-    """A digest of the keys, faces and edges: a stored map belongs to keys with the same digest."""
+    """Hash of the keys, faces and edges; a stored map belongs to the keys with the same hash."""
     digest = hashlib.sha256()
     arrays = [pair.key0, pair.key1, pair.faces, pair.edges]
     polygons = np.unique(pair.polygons, return_index=True, return_inverse=True)
@@ -44,7 +44,7 @@ def _seal(content: bytes) -> bytes:
 
 
 def to_bytes(fitted: FittedMap) -> bytes:
-    """Store the mesh and the map behind a seal; the keys themselves are not stored, only their digest."""
+    """Store a fitted map, preceded by a checksum. Of the keys only the hash is stored."""
     header = {
         "version": FORMAT_VERSION,
         "fingerprint": fingerprint(fitted.pair),
@@ -77,7 +77,7 @@ def why_unusable(data: bytes) -> str | None:
 
     Returns
     -------
-    The end of a sentence about the stored map: "is damaged", or by which version it was stored.
+    The end of a sentence about the stored map: "is damaged", or which version made it.
     """
     if not _is_whole(data):
         return "is damaged"
@@ -89,7 +89,7 @@ def why_unusable(data: bytes) -> str | None:
         return "is damaged"
     if version == FORMAT_VERSION:
         return None
-    return f"was stored by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
+    return f"was made by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
 
 
 def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
@@ -98,9 +98,9 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     Raises
     ------
     InputError
-        If the bytes are damaged, of another version, or belong to other keys.
+        If the bytes are damaged, have another version, or belong to other keys.
     """
-    # Unpacking what is damaged can fail in many ways, or not at all.
+    # Unpacking damaged data can fail in many ways, or not at all.
     if not _is_whole(data):
         raise InputError(_DAMAGED)
     try:
@@ -129,7 +129,7 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     if turns.shape != (len(tets), 3) or not all(np.isfinite(numbers).all() for numbers in (points, maps, turns)):
         raise InputError(_DAMAGED)
     mesh = TetMesh(points, tets)
-    # Jacobians can be computed only where no volume is zero.
+    # Jacobians exist only if no volume is zero.
     if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
     return FittedMap.restored(pair, mesh, maps, turns, options, engine, notes)

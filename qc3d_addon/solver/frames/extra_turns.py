@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Full turns of whole parts, which two keys cannot tell: each part about its own axis through its middle."""
+"""Extra turns: full turns of whole parts, about their own axes, which two keys alone do not determine."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ExtraSpins:
         still = embedding.still
         whole = not still.any()
         labels = np.zeros(len(still), dtype=np.int64) if whole else surface.components
-        directions = embedding.motion.turn[None] if whole else _mean_turns(surface, labels)
+        directions = embedding.motion.turn + (np.zeros((1, 3)) if whole else _mean_turns(surface, labels))
         sizes = np.linalg.norm(directions, axis=1)
         free = (sizes > _LEAST_TURN) & ~_held(embedding.key0, still, labels) & (turns != 0)
         self._vertices = np.flatnonzero(free[labels])

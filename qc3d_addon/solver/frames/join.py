@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several pairs in a row, A to B to C, without a stop or a jerk at the keys between.
+"""Joins the pairs of a chain, so that the motion goes through the inner keys without a stop or a jerk.
 
-At an inner key both neighbours get the mean of their rates: angular velocities and strain rates of the triangles and
-growth of the volumes, so that lengths still hold. What little difference is left in the velocities of the vertices is
-taken away by moving them.
+At an inner key, both adjacent pairs get the mean of their rates: angular velocities and strain rates of the triangles,
+and growth rates of the volumes. This keeps lengths. The small differences that remain between the velocities of the
+vertices are removed by displacing the vertices themselves.
 """
 
 from __future__ import annotations
@@ -17,19 +17,22 @@ from ..arrays import Bools, Floats
 from ..surface.end_rates import Rates
 from .natural import NaturalFrames
 
-_VELOCITY_STEP = 0.02
+_VELOCITY_STEP = 0.02  # of a pair's time: second-order differences are accurate enough, and rounding is negligible
 
 
 def join(makers: Sequence[NaturalFrames]) -> list[NaturalFrames]:
-    """Frames of consecutive pairs of one mesh, the second key of each being the first of the next, with equal
-    velocities on both sides of every inner key; each pair takes the same time.
+    """Give consecutive pairs of one mesh, each taking the same time, equal velocities on both sides of inner keys.
 
-    What both keys of a pair leave in place has no velocity at either of them, so that it stays in place.
+    Still vertices of a pair have no velocity at its keys, so that they stay in place.
     """
     rates = [list(maker.end_rates()) for maker in makers]
     for left in range(len(makers) - 1):
         rates[left][1], rates[left + 1][0] = _shared_rates(makers, left, rates[left][1], rates[left + 1][0])
-    joined = [maker.with_end_rates(first, second) for maker, (first, second) in zip(makers, rates, strict=True)]
+    last = len(makers) - 1
+    joined = [
+        maker.with_end_rates(first, second, (number > 0, number < last))
+        for number, (maker, (first, second)) in enumerate(zip(makers, rates, strict=True))
+    ]
     velocities = [[_velocity(maker, end) for end in (0, 1)] for maker in joined]
     slopes = [[np.zeros_like(velocity) for velocity in ends] for ends in velocities]
     for left in range(len(joined) - 1):
@@ -41,7 +44,7 @@ def join(makers: Sequence[NaturalFrames]) -> list[NaturalFrames]:
 
 
 def _shared_rates(makers: Sequence[NaturalFrames], left: int, before: Rates, after: Rates) -> tuple[Rates, Rates]:
-    """The mean of the rates on both sides of a key, for the triangles that both sides have."""
+    """Rates on both sides of a key, averaged for the triangles that both sides have."""
     _, mine, others = np.intersect1d(makers[left].rows, makers[left + 1].rows, return_indices=True)
     rests: Bools = makers[left].resting[mine] | makers[left + 1].resting[others]
     spins, strains = [before.spin.copy(), after.spin.copy()], [before.strain.copy(), after.strain.copy()]
@@ -56,7 +59,7 @@ def _shared_rates(makers: Sequence[NaturalFrames], left: int, before: Rates, aft
 
 
 def _velocity(maker: NaturalFrames, end: int) -> Floats:
-    """(n, 3) velocities at a key, 0 or 1, by one-sided differences of second order."""
+    """(n, 3) velocities at the first (0) or second (1) key, by one-sided differences of second order."""
     near, far = (maker.shape(abs(end - step * _VELOCITY_STEP)) for step in (1, 2))
     outward = (4.0 * near - far - 3.0 * maker.key(end)) / (2.0 * _VELOCITY_STEP)
     return np.asarray(outward if end == 0 else -outward)

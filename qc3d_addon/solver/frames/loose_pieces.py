@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loose pieces, such as leaves, stones or buttons, that run into others on their way step aside.
+"""Moves loose pieces, such as leaves, stones or buttons, aside where they would collide on their way.
 
-A straight blend lets pieces that turn shrink, so that they miss each other; pieces that keep their size may meet.
+In a straight blend, turning pieces shrink and miss each other; pieces that keep their size may collide.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from ..collision.self_crossings import CrossingLimit
 from ..numerics.grouped_sums import means_by_label, sums_by_label
 from ..triangles.geometry import areas, face_normals
 
-# So often, and so often again without fewer crossings than before.
+# Largest number of iterations, and of successive iterations without fewer crossings.
 _ROUNDS, _PATIENCE = 24, 4
-# Of the surface: what has more is no piece, but the body that pieces are on.
+# Share of the surface; a component with more is the body that the pieces belong to.
 _LARGEST_PIECE = 0.25
-# Of a piece's size, the farthest that it steps aside.
+# Largest displacement of a piece, relative to its size.
 _FARTHEST = 0.25
-# By how much more than it has to at first, and by how much more again each time that this was not enough.
+# Over-relaxation: factor on the displacement in the first iteration, and its increase in each further one.
 _MORE, _MORE_AGAIN = 1.2, 0.4
-# Near a key a step is short, and cannot be made longer than this times as much in the middle for its sake.
+# Displacements vanish at the keys. A crossing near a key may enlarge the one in the middle by at most this factor.
 _MOST_WIDENED = 4.0
 
 
 class LoosePieces:
-    """The pieces of a surface that may step aside.
+    """The connected components of a surface that may move aside.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class LoosePieces:
     components : (n,) int64
         Labels of the connected components.
     still : (n,) bool
-        Vertices that stay in place; pieces that have one do too.
+        Still vertices; components that have one do not move aside.
     """
 
     def __init__(self, key0: Floats, faces: Ints, components: Ints, still: Bools) -> None:
@@ -54,9 +54,9 @@ class LoosePieces:
     def apart(
         self, limit: CrossingLimit, times: Floats, shapes: list[Floats], excess: list[int | None]
     ) -> tuple[list[Floats], list[int | None]]:
-        """Shapes (n, 3) at ``times`` (k,) in which fewer pieces cross, and what is left of their excess of crossings.
+        """Shapes (n, 3) at ``times`` (k,) with fewer crossings, and the number of new crossings that each still has.
 
-        Each piece keeps its shape and steps aside along one direction, the farther the nearer to the middle of the way.
+        Each piece keeps its shape and is displaced in one direction by an amount proportional to t (1 - t).
         """
         if not self._free.any() or not any(excess):
             return shapes, excess
@@ -80,7 +80,7 @@ class LoosePieces:
         return best, left
 
     def _wanted(self, limit: CrossingLimit, width: Floats, shapes: Sequence[Floats]) -> Floats:
-        """(components, 3) how much farther each piece should step aside: the widest that any of the shapes asks for."""
+        """(components, 3) further displacement of each piece: the largest that any of the shapes needs."""
         wanted = np.zeros((len(self._sizes), 3))
         for shape, part in zip(shapes, width.tolist(), strict=True):
             pairs = limit.new_pairs(shape) if part > 0.0 else np.empty((0, 2), dtype=np.int64)
@@ -91,12 +91,12 @@ class LoosePieces:
         return wanted
 
     def _asked(self, shape: Floats, pairs: Ints) -> Floats:
-        """(components, 3) the steps that take crossing triangles (k, 2) apart, the shortest way out of their planes."""
+        """(components, 3) displacements that separate crossing triangles (k, 2), the shortest out of their planes."""
         sides = [self._out_of_plane(shape, first, second) for first, second in (pairs.T, pairs.T[::-1])]
         shorter = np.linalg.norm(sides[0], axis=1) <= np.linalg.norm(sides[1], axis=1)
         apart = np.where(shorter[:, None], sides[0], -sides[1])
         pieces = self._labels[self._faces[pairs, 0]]
-        # Out of the plane and away from the other's middle: alone, the one turns back at edges, the other slides along.
+        # Out of the plane plus away from the other's center: the first alone fails at edges, the second at long sides.
         middles = means_by_label(self._labels, shape, count=len(self._sizes))
         away = middles[pieces[:, 0]] - middles[pieces[:, 1]]
         away /= np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
@@ -105,12 +105,12 @@ class LoosePieces:
         share = moves / np.maximum(moves.sum(axis=1, keepdims=True), 1)
         labels = pieces.T.ravel()
         steps = np.concatenate([share[:, :1] * apart, -share[:, 1:] * apart])
-        # A piece in the way of several takes the mean of their ways out, weighted by how long they are.
+        # A piece with several crossings gets their mean displacement, weighted by length.
         lengths = np.linalg.norm(steps, axis=1)
         return means_by_label(labels, steps, lengths, len(self._sizes))
 
     def _out_of_plane(self, shape: Floats, first: Ints, second: Ints) -> Floats:
-        """(k, 3) the shortest moves of the ``first`` triangles (k,) that put each on one side of the ``second``."""
+        """(k, 3) shortest displacements of the ``first`` triangles (k,) to one side of the planes of the ``second``."""
         normals = face_normals(shape, self._faces[second])
         normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
         corners = shape[self._faces[first]] - shape[self._faces[second][:, :1]]

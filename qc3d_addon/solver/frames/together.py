@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several meshes of one character as one: the skin, its lashes and clothes in one map, so that they stay together."""
+"""Bakes several meshes of one character, such as skin, lashes and clothes, in one map, so that they stay together."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from .measures import worst_stretch
 
 @dataclass(frozen=True, eq=False)
 class PlacedMesh:
-    """A mesh with its keys, and where it is.
+    """A mesh with its keys and its transform.
 
     Parameters
     ----------
     pairs : dict
-        Its pairs by the names of their keys, which are the same for all meshes.
+        The pairs of the mesh, by the names of their keys, which are the same for all meshes.
     matrix : (4, 4)
-        From the mesh's own coordinates to those that all meshes share.
+        Transform from the mesh's own coordinates to those that all meshes share.
     """
 
     pairs: dict[Ends, KeyPair]
@@ -40,12 +40,12 @@ class PlacedMesh:
         return np.asarray(points @ self.matrix[:3, :3].T + self.matrix[:3, 3])
 
     def own(self, points: Floats) -> Floats:
-        """Points (..., 3) in the shared coordinates, back in the mesh's own."""
+        """Points (..., 3) in shared coordinates, transformed to the mesh's own."""
         return np.asarray((points - self.matrix[:3, 3]) @ np.linalg.inv(self.matrix[:3, :3]).T)
 
 
 class Together:
-    """The pairs of several meshes joined, and their frames taken apart again.
+    """Joins the pairs of several meshes and separates their frames again.
 
     Parameters
     ----------
@@ -54,12 +54,12 @@ class Together:
     Raises
     ------
     InputError
-        If there is none, the names of their keys differ, or one has no size along an axis where it is placed.
+        If there is no mesh, the names of the keys differ, or a transform is singular.
 
     Attributes
     ----------
     pairs : dict
-        The joined pairs. What coincides in all keys, such as a lash on its lid, is taken as one.
+        The joined pairs. Vertices that coincide in all keys, such as those of a lash on its lid, count as one.
     """
 
     def __init__(self, meshes: Sequence[PlacedMesh]) -> None:
@@ -67,9 +67,9 @@ class Together:
             raise InputError("There are no meshes to bake together; give at least one.")
         for mesh in meshes:
             if mesh.pairs.keys() != meshes[0].pairs.keys():
-                raise InputError("The meshes have keys of other names; meshes that are baked together share them.")
+                raise InputError("The meshes have keys of different names; meshes that are baked together share them.")
             if not abs(np.linalg.det(mesh.matrix[:3, :3])) > 0.0:
-                raise InputError("A mesh has no size along an axis where it is placed; give it a scale other than 0.")
+                raise InputError("A mesh has the scale 0 along an axis; set another scale.")
         self._meshes = meshes
         counts = [len(_any_pair(mesh).key0) for mesh in meshes]
         self._starts = np.cumsum([0, *counts]).tolist()
@@ -93,12 +93,13 @@ class Together:
         return KeyPair(key0, key1, np.concatenate(faces), np.concatenate(edges), np.concatenate(labels))
 
     def apart(self, bake: Bake, options: FrameOptions, through: Sequence[str]) -> list[Bake]:
-        """The bake of each mesh, in its own coordinates, from the one of the joined pairs.
+        """The bake of each mesh, in its own coordinates, from the bake of the joined pairs.
 
         Parameters
         ----------
+        bake : Bake
         options : FrameOptions
-            With which the frames were made.
+            The options of the bake.
         through : sequence of str
             Names of the keys from the first to the last.
         """
@@ -128,7 +129,7 @@ def _any_pair(mesh: PlacedMesh) -> KeyPair:
 
 
 def _exact(frame: Floats, pair: KeyPair, time: float) -> None:
-    """Put back what coming from the shared coordinates has rounded: keys, what stays in place, what is on a plane."""
+    """Make exact again what the transform has rounded: keys, still vertices, and vertices on a mirror plane."""
     if time in (0.0, 1.0):
         frame[...] = pair.key1 if time else pair.key0
         return

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of which only one half was modeled: the mirrored whole is what moves, and its seam stays shut.
+"""Meshes of which only one half was modeled: QC3D moves the mirrored whole, so that its seam stays closed.
 
-The whole has the vertices of the half first and one copy of all for each plane after them, also of those on the plane:
-their copies are where they are, so that they are taken as one.
+The whole has the vertices of the half first, followed by one copy of all vertices for each plane. Vertices on the plane
+are copied too; they coincide with their copies and therefore count as one vertex.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from ..errors import InputError
 from ..settings import Mirror
 from ..triangles.topology import open_loops, sides, unique_edges, vertex_components, welded
 
-# Of the size: coordinates that are meant to be 0 are no farther off in single precision.
+# Relative to the size: tolerance for coordinates that should be 0, in single precision.
 _ON_PLANE = 1e-6
 
 
 @dataclass(frozen=True)
 class MirrorPlane:
-    """A plane and what lies across it: x goes to x - 2 (normal . x - offset) direction.
+    """A mirror plane; the image of x is x - 2 (normal . x - offset) direction.
 
     Parameters
     ----------
     normal, direction : tuple of 3 float
-        ``normal . direction`` is 1; they are equal where nothing is sheared.
+        ``normal . direction`` is 1; they are equal without shear.
     offset : float
     reach : float
-        A vertex is on the plane where ``normal . x`` is no farther than this from the offset, in all keys.
+        A vertex is on the plane if ``normal . x`` differs from the offset by at most this, in all keys.
     """
 
     normal: tuple[float, float, float]
@@ -48,11 +48,11 @@ class MirrorPlane:
         return cls((x, y, z), (x, y, z), 0.0, reach)
 
     def heights(self, points: Floats) -> Floats:
-        """(n,) how far points (n, 3) are above the plane, along the direction."""
+        """(n,) signed distances of points (n, 3) from the plane, along the direction."""
         return np.asarray(points @ np.array(self.normal) - self.offset)
 
     def raised(self, points: Floats, by: Floats) -> Floats:
-        """Points (n, 3) moved along the direction by (n,)."""
+        """Points (n, 3) moved along the direction by distances (n,)."""
         return np.asarray(points + by[:, None] * np.array(self.direction))
 
 
@@ -73,7 +73,7 @@ class Whole:
     polygons: Ints
 
     def mirrored(self, plane: MirrorPlane) -> Whole:
-        """This with its mirror image behind it, whose triangles are turned so that normals go on pointing out."""
+        """This mesh followed by its mirror image, whose triangles are reversed so that normals still point outward."""
         count = len(self.shapes[0])
         heights = [plane.heights(shape) for shape in self.shapes]
         apart = np.any([np.abs(height) > plane.reach for height in heights], axis=0)
@@ -94,8 +94,8 @@ def mirror_planes(mirror: Mirror, shapes: Mapping[str, Floats], faces: Ints) -> 
     Parameters
     ----------
     mirror
-        The axes, ``none``, or ``auto``: those across which the mesh is open. It is where a whole loop of open edges
-        lies on the plane in all shapes, and the mesh on one side of it.
+        The axes, ``none``, or ``auto``: those across which the mesh is open. That is so if a whole loop of boundary
+        edges lies on the plane in all shapes and the mesh is on one side of it.
     shapes : dict of (n, 3)
     faces : (m, 3)
 
@@ -126,7 +126,7 @@ def _is_open_across(plane: MirrorPlane, shapes: Sequence[Floats], faces: Ints) -
         return False
     vertices, group = welded(shapes[0], shapes[-1])
     faces = group[faces]
-    # A page that lies on the plane is no half of anything.
+    # A flat component that lies on the plane is not half of anything.
     labels = vertex_components(unique_edges(sides(faces)), len(vertices))
     lies = np.zeros(len(vertices), dtype=bool)
     for height in heights:
@@ -141,12 +141,12 @@ def _is_open_across(plane: MirrorPlane, shapes: Sequence[Floats], faces: Ints) -
 def held_on_planes(
     frame: Floats, time: float, key0: Floats, key1: Floats, planes: Sequence[MirrorPlane]
 ) -> Floats:
-    """A frame (N, 3) of a whole whose vertices on a plane stay as near to it as the keys have them.
+    """A frame (N, 3) of a whole, with the distances of vertices on a plane from it interpolated between the keys.
 
     Parameters
     ----------
     time : float
-        0..1 between the keys (N, 3) of the whole.
+        Time between the keys (N, 3) of the whole, in [0, 1].
     """
     own = len(key0) >> len(planes)
     for number, plane in enumerate(planes):
@@ -158,6 +158,6 @@ def held_on_planes(
 
 
 def on_plane(key0: Floats, key1: Floats, own: int, number: int) -> Bools:
-    """(own,) which vertices of the half are on the plane ``number`` in both keys: there their copies are themselves."""
+    """(own,) which vertices of the half are on the plane ``number`` in both keys: those that equal their copies."""
     copies = slice(own << number, (own << number) + own)
     return np.asarray((key0[copies] == key0[:own]).all(axis=1) & (key1[copies] == key1[:own]).all(axis=1))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where vertices are drawn to when there is no volume yet: every component along the screw motion between its keys."""
+"""Anchors of the vertices while there is no volume: each component moves along the screw between its keys."""
 
 from __future__ import annotations
 
@@ -63,5 +63,5 @@ class ScrewAnchors:
         return moved
 
     def positions(self, time: float) -> Floats:
-        """(n, 3) anchors at ``time``; the keys at 0 and 1."""
+        """(n, 3) anchors at ``time`` in 0..1; they are the keys at 0 and 1."""
         return self._moved(time) + time * self._missing

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface on its way from one key to the other: lengths, volumes and still vertices kept, both keys exact."""
+"""The surface path: shapes between two keys that keep lengths, volumes and still vertices, and meet both keys."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..keys.embedding import Embedding
+from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned
 from ..numerics.rotations import by_component
@@ -37,6 +37,8 @@ from .system import MovingSurface
 from .tangents import tangents_of
 
 ANCHOR_WEIGHT = 5e-5
+# What travels a hundredth of the size or more is not drawn to its line at all.
+_NO_LINE = (NEARLY_STILL / 1e-2) ** 2
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -44,12 +46,12 @@ _TRIANGLES_AT_ONCE = 150_000
 
 
 class SurfacePath:
-    """Shapes between the two keys of an embedded pair; everything that does not depend on the time is factored once.
+    """Shapes between the two keys of an embedded pair. Everything that does not depend on the time is factored once.
 
-    Positions minimise ``sum w |grad x - R_t P_t|^2 + a sum m |x - anchor_t|^2`` over triangles with weight w, rotation
-    R_t and stretch P_t, and vertices with area m; rotations are refitted to positions in sweeps. Edges that belong to
-    no usable triangle keep their interpolated lengths. Still vertices are held on the straight line between the keys.
-    The enclosed volume of every closed component is that between its key volumes.
+    Positions x minimize ``sum w |grad x - R(t) P(t)|^2 + a sum m |x - anchor(t)|^2`` over triangles with weight w,
+    rotation R and stretch P, and vertices with area m; local/global sweeps refit the rotations. Edges that belong to no
+    usable triangle act as springs that keep their interpolated lengths. Still vertices move straight between the keys.
+    The enclosed volume of each closed component is interpolated linearly.
 
     Parameters
     ----------
@@ -57,22 +59,24 @@ class SurfacePath:
     law : StretchLaw
         How stretches are interpolated.
     free_after_turns : bool
-        Whether what comes back to its place after whole turns is not still, but turns with the rest of its component.
+        Whether vertices that return to their place after full turns move with their component instead of being still.
     other_way : (p,) int64, optional
         Components that turn the other way round, by a full turn less.
 
     Attributes
     ----------
     vertices : (k,) int64
-        One of each group of vertices that coincide in both keys; ``deformation`` counts in these.
+        One vertex of each group that coincides in both keys; ``deformation`` uses indices into these.
     still : (n,) bool
-        Vertices that stay on the straight line between the keys.
+        Whether each vertex is still, and so stays on the straight line between the keys.
     components : (n,) int64
-        Labels of the connected components.
+        Connected component of each vertex.
     turning : Turning
-        How the triangles of ``deformation`` turn.
+        Unwrapped rotations of the triangles of ``deformation``.
     whole_turn : (3,)
         Rotation vector of the motion of the whole, which is taken out of the keys; radians.
+    rest : (3,)
+        Rotation vector of what stays in place beside that motion; zero where nothing does.
     half_turned : (p,) int64
         Components that turn by about half a turn as one, which may as well go the other way round.
     """
@@ -91,7 +95,7 @@ class SurfacePath:
         self._apart = None
         if embedding.pair.nearly_coincident:
             self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
-        self._travel = key1 - self._key0
+        self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
         faces = self._group[embedding.pair.faces]
@@ -101,9 +105,14 @@ class SurfacePath:
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
-        turning = consistent_turning(usable.turns, face_adjacency(usable.faces), centres, usable.weights, held)
+        # What stays in place turns back beside a motion that was taken out.
+        self.rest = -embedding.motion.turn if still.any() else np.zeros(3)
+        neighbours = face_adjacency(usable.faces)
+        turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, self.rest)
+        returned = np.zeros(count, dtype=bool)
         if free_after_turns:
-            still[usable.faces[turning.angles > np.pi]] = False
+            returned[usable.faces[turning.angles_from(self.rest) > np.pi]] = True
+            still &= ~returned
         self.still = still[self._group]
         self._free = ~still
         self._springs = edges_without_triangle(triangles, self._group[embedding.pair.edges], self.deformation.faces)
@@ -113,7 +122,7 @@ class SurfacePath:
         owners = labels[usable.faces[:, 0]]
         flipped = np.zeros(0, dtype=np.int64) if other_way is None else other_way
         self.turning = turning.other_way(np.isin(owners, flipped))
-        self.half_turned = half_turned(self.turning, usable.weights, owners)
+        self.half_turned = half_turned(self.turning, usable.weights, owners, self.rest)
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
@@ -124,9 +133,18 @@ class SurfacePath:
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
+        # What hardly travels is drawn to its straight line, in the limit as if it were still.
+        travel = np.maximum(embedding.travel[self.vertices], STILL_TOLERANCE)
+        self._line_weights = np.where(returned, 0.0, np.maximum((NEARLY_STILL / travel) ** 2 - _NO_LINE, 0.0) ** 2)
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
-            usable, self._springs, self._closed, (triangles, shares), self._free, self._key0, self._anchor_weights
+            usable,
+            self._springs,
+            self._closed,
+            (triangles, shares),
+            self._free,
+            self._key0,
+            self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
         self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
@@ -135,20 +153,21 @@ class SurfacePath:
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
-        """The same path, drawn to the anchors more strongly by ``factors`` (n,), each 1 or more."""
+        """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
         np.maximum.at(strongest, self._group, factors)
-        stronger._surface = self._surface.with_anchor_weights(self._anchor_weights * strongest)
+        stronger._anchor_weights = self._anchor_weights * strongest
+        stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
 
     def end_rates(self) -> tuple[Rates, Rates]:
-        """How fast triangles turn and stretch, and volumes grow, at the first and at the second key."""
+        """Rates of rotation, stretch and volume at the first and at the second key."""
         deformation = self.deformation
         spins = end_spins(self.turning.swing, self.turning.twist)
         slopes = stretch_slopes(deformation.stretch, self._law)
         growth = self._volumes[1] - self._volumes[0]
-        # Seen in the tangents of the second key.
+        # In the tangent bases of the second key.
         second = deformation.spins @ strain_of_slope(deformation.stretch, slopes[1])
         second = second @ deformation.spins.transpose(0, 2, 1)
         return Rates(spins[0], slopes[0], growth), Rates(spins[1], second, growth)
@@ -168,24 +187,25 @@ class SurfacePath:
 
     @property
     def shapes_at_once(self) -> int:
-        """For how many times it pays to solve together: a few where that spares calls and passes of the factors."""
+        """Number of shapes to solve together: several on small meshes, which saves calls and memory traffic."""
         return max(1, min(_MOST_AT_ONCE, _TRIANGLES_AT_ONCE // max(1, len(self._surface.rows))))
 
     def positions(self, time: float, anchor: Floats | None = None, sweeps: int = SWEEPS) -> Floats:
-        """(n, 3) positions in cube units at ``time`` in 0..1; the keys themselves at 0 and 1.
+        """(n, 3) positions in cube units at a time; the keys themselves at 0 and 1.
 
         Parameters
         ----------
         time : float
+            In 0..1.
         anchor : (n, 3), optional
-            What vertices are drawn to, the key at 0 and 1; without it each component is drawn along its screw.
+            Anchors of the vertices, equal to the keys at 0 and 1. By default each component follows its screw motion.
         sweeps : int
-            How often rotations are fitted to positions and positions to rotations.
+            Number of local/global iterations.
         """
         return self.shapes([(time, anchor)], sweeps)[0]
 
     def shapes(self, moments: Sequence[tuple[float, Floats | None]], sweeps: int = SWEEPS) -> list[Floats]:
-        """The ``positions`` at several times with their anchors, solved together: faster than one by one."""
+        """The ``positions`` for several (time, anchor), solved together, which is faster than one by one."""
         wanted = [self._wanted(*moment) for moment in moments]
         work = Sweeps(self._surface, wanted)
         settled = work.settled(sweeps)
@@ -200,7 +220,7 @@ class SurfacePath:
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
-        """Positions (n, 3) of all vertices: copies are as far from the one of their group as in the keys."""
+        """(n, 3) positions of all vertices; coincident ones keep the tiny, interpolated offsets of their keys."""
         positions = self._rigid.placed(shape, time)[self._group]
         if self._apart is not None:
             positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
@@ -218,8 +238,10 @@ class SurfacePath:
             turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
         tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
-        start = self._key0 + time * self._travel
-        start[self._free] = anchors[self._free]
+        lines = self._embedding.straight(time)[self.vertices]
+        share = (self._line_weights / (self._anchor_weights + self._line_weights))[:, None]
+        anchors = anchors + share * (lines - anchors)
+        start = np.where(self._free[:, None], anchors, lines)
         return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
 
 
@@ -228,7 +250,7 @@ def _spans(positions: Floats, edges: Ints) -> Floats:
 
 
 def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
-    """(k, 2) edges that no usable triangle holds together: wires and edges of triangles without an area."""
+    """(k, 2) edges of no usable triangle: loose edges, and edges of triangles without an area."""
     every = unique_edges(np.concatenate([sides(faces), wires]))
     held = unique_edges(sides(usable))
     span = int(every.max(initial=0)) + 1

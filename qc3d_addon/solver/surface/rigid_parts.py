@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loose parts that are congruent in both keys: they move rigidly, whatever draws at them."""
+"""Keeps components that are congruent in both keys rigid during the motion."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_b
 from ..numerics.rotations import rotation_matrices
 from ..numerics.screws import best_turns
 
-# Of a part's size: within the first its keys are congruent, as far as modeling and single precision allow; beyond the
-# second they are not. Between, it is a matter of degree.
+# Relative to a component's size: its keys are congruent if they deviate by less than the first, which covers modeling
+# and single precision, and not congruent beyond the second. In between, the correction fades out.
 _CONGRUENT, _OTHERWISE = 1e-4, 1e-3
 
 
 class RigidParts:
-    """Puts each component that is congruent in both keys in its place as a rigid body.
+    """Replaces each component that is congruent in both keys by the best-fitting rigid body (Kabsch 1976).
 
-    What little the keys of a part differ is blended in. A component with vertices that stay in place is left as it is.
+    The small deviation between the two keys is blended in. Components with still vertices are left as they are.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class RigidParts:
         self._missed = missed[self._members]
 
     def placed(self, shape: Floats, time: float) -> Floats:
-        """A shape (n, 3) at ``time`` in 0..1 whose rigid parts are rigid, each where it is in the shape."""
+        """The shape (n, 3) at ``time``, in [0, 1], with its congruent components replaced by rigid ones."""
         if not len(self._members):
             return shape
         own, result = self._members, shape.copy()
@@ -58,7 +58,7 @@ class RigidParts:
         return result
 
     def _placed(self, source: Floats, target: Floats) -> Floats:
-        """(n, 3) the members of each component moved rigidly from the source as near as possible to the target."""
+        """(n, 3) target in which the members of each component are the rigidly moved source that fits them best."""
         own, moved = self._members, target.copy()
         parts = np.unique(self._labels[own], return_inverse=True)[1].ravel()
         weight = self._weights[own] / sums_by_label(parts, self._weights[own])[parts]

@@ -83,15 +83,15 @@ def _settle(partners: Ints, candidates: dict[int, list[int]], edges: Ints) -> No
     involved = np.unique([*candidates, *chain.from_iterable(candidates.values())])
     touching = edges[np.isin(edges, involved).any(axis=1)]
     linked = {frozenset(edge) for edge in touching.tolist()}
-    neighbours: dict[int, list[int]] = {}
+    neighbors: dict[int, list[int]] = {}
     for first, second in touching.tolist():
-        neighbours.setdefault(first, []).append(second)
-        neighbours.setdefault(second, []).append(first)
+        neighbors.setdefault(first, []).append(second)
+        neighbors.setdefault(second, []).append(first)
     open_vertices = list(candidates)
     while open_vertices:
         left = []
         for vertex in open_vertices:
-            known = [int(partners[other]) for other in neighbours.get(vertex, ()) if partners[other] >= 0]
+            known = [int(partners[other]) for other in neighbors.get(vertex, ()) if partners[other] >= 0]
             fits = [c for c in candidates[vertex] if known and all(frozenset((c, other)) in linked for other in known)]
             if len(fits) == 1:
                 partners[vertex] = fits[0]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirror partners by how a mesh is built: where places do not tell, polygons around known partners do."""
+"""Mirror partners by topology, for meshes whose positions are not symmetric: by the polygons around known partners."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from .topology import distinct
 
 
 def topology_partners(corners: Ints, starts: Ints, partners: Ints) -> Ints:
-    """Further mirror partners, found by walking over the polygons of both sides at once.
+    """Further mirror partners, found by a breadth-first traversal of the polygons of both sides at once.
 
-    Where both ends of an edge have a partner, the polygon on its one side is the mirror image of the polygon on the
-    other side of the partners' edge, if it has as many corners, and so are the polygons around it.
+    If both ends of an edge have partners, the polygon on one side of the edge is the mirror image of the polygon on the
+    other side of the partners' edge, provided that both have the same number of corners. The polygons around them
+    follow in turn.
 
     Parameters
     ----------
     corners : (c,) int64
         The vertices of all polygons, one polygon after the other.
     starts : (p + 1,) int64
-        Where each polygon begins in them; the last is where they end.
+        Index of each polygon's first corner; the last entry is c.
     partners : (n,) int64
-        Partners that are known, -1 elsewhere, such as those of ``mirror_symmetry``. They are kept.
+        Known partners, such as those of ``mirror_symmetry``, and -1 elsewhere. They are kept.
 
     Returns
     -------
     (n,) int64
-        Partners, -1 where there is none; the partner of a vertex's partner is that vertex.
+        Partners, -1 for vertices without one; the partner of a vertex's partner is that vertex.
     """
     count = len(partners)
     sizes = np.diff(starts)
@@ -44,7 +45,7 @@ def topology_partners(corners: Ints, starts: Ints, partners: Ints) -> Ints:
     codes, order = np.unique(corners * count + following, return_index=True)
 
     def along(first: Ints, second: Ints) -> Ints:
-        """The corner at which an edge from one vertex to another begins, -1 where there is none."""
+        """The corner at which the edge from one vertex to another begins; -1 if there is no such edge."""
         code = np.where((first >= 0) & (second >= 0), first * count + second, -1)
         found = np.minimum(np.searchsorted(codes, code), max(0, len(codes) - 1))
         return np.where(codes[found] == code, order[found], -1) if len(codes) else np.full(len(code), -1)

@@ -90,7 +90,7 @@ def test_another_modifier_of_that_name(shown: bpy.types.Object, state: State) ->
     shown.modifiers.new(heat_map.NAME, 'SUBSURF')
     before = state()
     assert heat_map.shown(shown) is None
-    with pytest.raises(RuntimeError, match=f"has another modifier of the name '{heat_map.NAME}'; rename that first"):
+    with pytest.raises(RuntimeError, match=f"has another modifier named '{heat_map.NAME}'; rename that first"):
         bpy.ops.qc3d.heat_map(show="on")
     assert state() == before
     assert bpy.ops.qc3d.heat_map(show="off") == {"FINISHED"}

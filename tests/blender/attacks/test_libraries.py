@@ -154,7 +154,7 @@ def test_a_library_of_colliders_is_reloaded_meanwhile(off: bpy.types.Collection,
     bpy.data.libraries[0].reload()
     bpy.context.view_layer.update()
     notes = write_bake(plan, outcome).notes
-    said = "The objects of 'Off' were changed meanwhile; re-bake to keep off where they are now."
+    said = "The colliders in 'Off' were changed during the bake; re-bake to use their present places."
     assert (said in notes) == moved
     assert bpy.ops.qc3d.rebake() == {"FINISHED"}
 

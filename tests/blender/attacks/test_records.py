@@ -253,22 +253,22 @@ def test_no_operator_touches_what_is_refused(
         (("keys",), {}, {"absolute_keys": "", "rebake": ""}),
         (("keys",), {"0": "Basis", "1": "Stretch", "2": "None"}, {"absolute_keys": "were deleted", "rebake": ""}),
         (("slider",), "Something else", {"to_keyframes": "was deleted", "remove": "", "rebake": ""}),
-        (("through",), ["Stretch", "Lean"], {"rebake": "", "save_map": "is no more that of the keys"}),
+        (("through",), ["Stretch", "Lean"], {"rebake": "", "save_map": "no longer matches the keys"}),
         (("through",), ["None", "Lean"], {"rebake": "", "remove": ""}),
-        (("request",), {}, {"rebake": "is not known any more", "live_scrub": "is not known any more", "remove": ""}),
-        (("request", "count"), 10**9, {"rebake": "is not known any more"}),
-        (("request", "count"), 10**400, {"rebake": "is not known any more"}),
-        (("request", "count"), 1.5, {"rebake": "is not known any more"}),
-        (("request", "tolerance"), "0.1", {"rebake": "is not known any more"}),
-        (("request", "colliders"), 7, {"rebake": "is not known any more"}),
-        (("request", "settings"), 7, {"rebake": "is not known any more"}),
-        (("request", "settings", "mode"), "later", {"rebake": "is not known any more"}),
-        (("request", "settings", "extra_turns"), 1.5, {"rebake": "is not known any more"}),
-        (("request", "settings", "seed"), "2", {"rebake": "is not known any more"}),
-        (("request", "settings", "seed"), True, {"rebake": "is not known any more"}),
+        (("request",), {}, {"rebake": "are unknown", "live_scrub": "are unknown", "remove": ""}),
+        (("request", "count"), 10**9, {"rebake": "are unknown"}),
+        (("request", "count"), 10**400, {"rebake": "are unknown"}),
+        (("request", "count"), 1.5, {"rebake": "are unknown"}),
+        (("request", "tolerance"), "0.1", {"rebake": "are unknown"}),
+        (("request", "colliders"), 7, {"rebake": "are unknown"}),
+        (("request", "settings"), 7, {"rebake": "are unknown"}),
+        (("request", "settings", "mode"), "later", {"rebake": "are unknown"}),
+        (("request", "settings", "extra_turns"), 1.5, {"rebake": "are unknown"}),
+        (("request", "settings", "seed"), "2", {"rebake": "are unknown"}),
+        (("request", "settings", "seed"), True, {"rebake": "are unknown"}),
         (("result",), None, {"select_worst": "were not measured", "rebake": "", "heat_map": ""}),
         (("result", "worst", "vertex"), 10**9, {"select_worst": "were not measured", "heat_map": ""}),
-        (("mirror_of",), "None", {"mirror": "is the mirror image of 'None' itself", "rebake": ""}),
+        (("mirror_of",), "None", {"mirror": "is itself the mirror image of 'None'", "rebake": ""}),
     ],
 )
 def test_what_is_read_is_harmless(
@@ -301,7 +301,7 @@ class TestVersions:
         (chain,) = Record.read(keys).chains
         assert (chain.result, chain.request, chain.mirror_of) == (None, {}, "")
         assert (chain.places, chain.corners) == ((0.0, 1 / 3, 2 / 3, 1.0), (1, 2))  # hats
-        with pytest.raises(RuntimeError, match="not known any more; bake anew"):
+        with pytest.raises(RuntimeError, match="are unknown; bake anew"):
             bpy.ops.qc3d.rebake()
         assert drawn(baked).texts[0] == f'["{SLIDER}"]'
         assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", count=2) == {"FINISHED"}

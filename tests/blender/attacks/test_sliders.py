@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("quick_map")
 Shown = Callable[..., np.ndarray]
 State = Callable[[], dict[str, Any]]
 SLIDER = "Basis_to_Lean"
-NOT_A_NUMBER = f"The slider '{SLIDER}' of 'Figure' is not a number any more; delete that custom property, then re-bake"
+NOT_A_NUMBER = f"The slider '{SLIDER}' of 'Figure' is no longer a number; delete that custom property, then re-bake"
 DELETED = f"The slider '{SLIDER}' was deleted; re-bake it first."
 
 
@@ -63,8 +63,10 @@ def test_what_is_no_number(baked: bpy.types.Object, state: State, tmp_path: Path
             getattr(bpy.ops.qc3d, name)()
         assert str(caught.value).strip().startswith(f"Error: {NOT_A_NUMBER}"), name
         assert state() == before
-    with pytest.raises(RuntimeError, match="is not a number any more"):
-        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", use_keyframes=True)
+    with pytest.raises(RuntimeError, match="is no longer a number"):
+        bpy.ops.qc3d.bake_inbetweens(
+            play_on="slider", from_key="Basis", to_key="Lean", mode="linear", use_keyframes=True
+        )
     assert NOT_A_NUMBER in drawn(baked).texts[0]
     # What does not need it works, and leaves it alone.
     assert bpy.ops.qc3d.export_alembic(filepath=str(tmp_path / "a.abc"), frames=2) == {"FINISHED"}
@@ -136,7 +138,7 @@ def test_numbers_beyond_the_keys(baked: bpy.types.Object, shown: Shown, value: f
 class TestNaN:
     """Blender stops a driver for good as soon as what it reads is NaN."""
 
-    SENTENCE = f"The slider '{SLIDER}' of 'Figure' has no value (NaN); give it one, or mend what drives it."
+    SENTENCE = f"The slider '{SLIDER}' of 'Figure' has no value (NaN); set one, or repair what drives it."
 
     def test_live_scrub_ends_and_can_be_switched_on_again(
         self, baked: bpy.types.Object, shown: Shown, capfd: pytest.CaptureFixture[str]
@@ -173,7 +175,7 @@ class TestNaN:
         put(baked, 0.0)
         for curve in drivers.driven_by(baked.data.shape_keys, slider_path(SLIDER)).values():
             curve.driver.is_valid = False  # as Blender does for good to those of earlier versions
-        assert "Blender stopped the drivers, since the slider had no value for a moment" in drawn(baked).texts[1]
+        assert "Blender stopped the drivers because the slider had no value (NaN) for a moment" in drawn(baked).texts[1]
         assert bpy.ops.qc3d.rebake() == {"FINISHED"}
         assert not [text for text in drawn(baked).texts if "stopped" in text]
         np.testing.assert_array_equal(shown(baked, **{SLIDER: 0.4}), there)

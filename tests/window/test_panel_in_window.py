@@ -88,7 +88,7 @@ def test_search_finds_it(window: Window, words: str) -> None:
     window.ask("arm().qc3d.quality = 'finest'")
     window.move(200, 300)
     time.sleep(0.3)
-    window.press("F3")
+    window.ask("with inside('WINDOW'): bpy.ops.wm.search_menu('INVOKE_DEFAULT')")
     time.sleep(1.0)
     window.type(words)
     time.sleep(1.0)

@@ -23,6 +23,7 @@ from qc3d_addon.solver.keys.embedding import Embedding
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.meshing.delaunay import delaunay_mesh
 from qc3d_addon.solver.meshing.poisson_disk import Resolution
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.surface.path import SurfacePath
 from qc3d_addon.solver.tets.point_location import interpolation_matrix
@@ -43,7 +44,7 @@ def main() -> None:
         embedding = Embedding.of(KeyPair.checked(key0, key1, faces))
         targets = path_to(SurfacePath(embedding), embedding.key1)
         for spacing in _SPACINGS:
-            mesh = delaunay_mesh(embedding.key0, faces, Resolution(spacing, 0.25, 5.0 * spacing), 0)
+            mesh = delaunay_mesh(embedding.key0, faces, Resolution(spacing, 0.25, 5.0 * spacing), FitOptions())
             landmarks = interpolation_matrix(mesh, embedding.key0)
             products: list[int] = []
             with patch.object(fold_free, "cg", _counting(cg, products)):

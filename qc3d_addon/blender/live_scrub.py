@@ -4,7 +4,7 @@
 
 A temporary shape key follows the slider and adds the difference to what the baked keys show, so that all other keys,
 the active key and the display stay as they are. It is not part of the file: it is removed before the file is saved and
-comes back afterwards. Its name is reserved: a key of that name is removed wherever undo or a recovered file brings it
+comes back afterward. Its name is reserved: a key of that name is removed wherever undo or a recovered file brings it
 back.
 """
 

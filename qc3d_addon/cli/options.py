@@ -24,7 +24,11 @@ _HELP = {
     "quality": "resolution of the volume around the mesh; exact: that of the mesh, with a map that meets both keys",
     "extra_turns": "full turns to add to parts that can turn freely, which two shapes alone cannot tell",
     "seed": "seed of the random samples of the engine delaunay",
+    "sampling": "samples of the engine delaunay: graded, or those of the paper",
+    "threshold": "for the paper's sampling: within so many radii of the surface samples are thinned",
+    "sparsity": "for the paper's sampling: how fast samples become fewer away from the surface",
 }
+_NUMBERS = ("threshold", "sparsity")
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
 
 
@@ -40,8 +44,12 @@ def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | Fram
                 f"--{name.replace('_', '-')}",
                 default=default,
                 help=f"{_HELP[name]} (default: {default})",
-                **({"choices": choices} if choices else {"type": whole_number, "metavar": _METAVARS[name]}),
+                **({"choices": choices} if choices else _number_of(name)),
             )
+
+
+def _number_of(name: str) -> dict[str, Any]:
+    return {"type": float, "metavar": "X"} if name in _NUMBERS else {"type": whole_number, "metavar": _METAVARS[name]}
 
 
 def fit_options(arguments: argparse.Namespace) -> FitOptions:

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from ..solver.errors import InputError
-from ..solver.files.atomic import making_folder, replacing, require_writable_in
+from ..solver.files.atomic import making_folder, replacing_all, require_writable_in
 from ..solver.maps.mapping import Mapping
 from . import speech
 
 if TYPE_CHECKING:
     from qc3d_paper.experiments.caption import Caption
-    from qc3d_paper.experiments.spectra import Experiment
+    from qc3d_paper.experiments.experiment import Experiment
 
     from ..solver.tets.mesh import TetMesh
 
@@ -44,16 +44,16 @@ def _run(arguments: argparse.Namespace) -> None:
         raise InputError("The figures need matplotlib, which is not installed; pip install 'qc3d[demo]'.")
     pictures = {number: arguments.output / f"figure{number}.png" for number in sorted(set(arguments.figure or NUMBERS))}
     require_writable_in(arguments.output, [*(path.name for path in pictures.values()), _TEXT])
-    texts = []
+    text = "# The paper's figures, made again\n"
     for number, path in pictures.items():
         drawn = BytesIO()
         caption = _draw(number, arguments.data, drawn)
-        with making_folder(arguments.output), replacing(path) as unfinished:
-            unfinished.write_bytes(drawn.getvalue())
-        texts.append(caption.text(path))
+        text += f"\n{caption.text(path)}"
+        # Each figure comes with its caption; a folder that is made stays only with something in it.
+        with making_folder(arguments.output), replacing_all(path, arguments.output / _TEXT) as (picture, captions):
+            picture.write_bytes(drawn.getvalue())
+            captions.write_text(text, encoding="utf-8")
         speech.say(f"Figure {number}: {caption.holds}")
-    with replacing(arguments.output / _TEXT) as unfinished:
-        unfinished.write_text("# The paper's figures, made again\n\n" + "\n".join(texts), encoding="utf-8")
 
 
 def _draw(number: int, data: Path | None, file: BinaryIO) -> Caption:
@@ -66,7 +66,7 @@ def _draw(number: int, data: Path | None, file: BinaryIO) -> Caption:
         return sequences.draw(str(number), known[number][data is not None], data, file)
     which, kind = divmod(number - 8, 3)
     draw = (spectra.draw_cubes, spectra.draw_spectrum, spectra.draw_errors)[kind]
-    return draw(str(number), _experiment(which, data), file)
+    return draw(str(number), _experiments(which, data), file)
 
 
 def _bijection(number: str, data: Path | None) -> tuple[str, Mapping]:
@@ -89,9 +89,11 @@ def _cube() -> TetMesh:
 
 
 @cache
-def _experiment(which: int, data: Path | None) -> Experiment:
-    """The first experiment uses a mild map, of a face; the second an extreme one, of a body."""
-    from qc3d_paper.experiments import shapes, spectra
+def _experiments(which: int, data: Path | None) -> list[Experiment]:
+    """A smooth bijection, as the paper's maps are, and a fitted map: first mild ones, a face, then extreme, a body."""
+    from qc3d_paper.experiments import bijections, shapes
+    from qc3d_paper.experiments.experiment import Experiment
 
     mild, extreme = (shapes.FACES, shapes.BODIES) if data is None else (shapes.DATA_FACES, shapes.DATA_BODIES)
-    return spectra.Experiment((mild[1], extreme[2])[which], data)
+    pose, formula = ((mild[1], "5"), (extreme[2], "4"))[which]
+    return [Experiment.smooth(*bijections.BIJECTIONS[formula]), Experiment.fitted(pose, data)]

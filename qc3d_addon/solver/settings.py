@@ -13,6 +13,7 @@ from .errors import InputError
 Mode = Literal["natural", "linear", "straight"]
 Easing = Literal["linear", "ease-in", "ease-out", "ease-in-out"]
 Engine = Literal["auto", "tetwild", "delaunay"]
+Sampling = Literal["graded", "published"]
 Quality = Literal["normal", "fine", "finest", "exact"]
 StretchLaw = Literal["linear", "logarithmic"]
 Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
@@ -31,18 +32,26 @@ class FitOptions:
     Parameters
     ----------
     engine
-        What fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild where it can run).
+        Method that fills the cube with tetrahedra: ``delaunay``, ``tetwild``, or ``auto`` (tetwild if it works).
     quality
-        How fine the tetrahedra are: ``normal``, ``fine`` or ``finest``; or ``exact``, with which they are as fine as
-        the surface, and the map meets both keys. That one is always filled by ``delaunay``.
+        Resolution of the tetrahedra: ``normal``, ``fine``, ``finest``, or ``exact``. With ``exact`` they are as fine as
+        the surface, the map meets both keys, and the engine is always ``delaunay``.
     seed
         Seed of the random samples of the ``delaunay`` engine, 0 or more.
     stretch
         How mode ``natural`` interpolates stretches: ``linear`` or ``logarithmic``.
     extra_turns
-        Full turns, -100..100, that two shapes cannot tell: mode ``natural`` adds them to parts that turn freely, each
-        about its own axis. Where a part is pinned by still vertices, a non-zero value also frees vertices that return
-        to their place after full turns.
+        Full turns, in [-100, 100], that two shapes cannot determine: mode ``natural`` adds them to parts that can turn
+        freely, each about its own axis. If still vertices hold a part, a value other than 0 also frees those of them
+        that return to their place after full turns.
+    sampling
+        What the ``delaunay`` engine triangulates: ``graded`` samples, or those of Chen & Lui (section 6.1),
+        ``published``: a uniform Poisson disk, of which samples are discarded at random.
+    threshold
+        Of the published sampling: within this many radii of the surface, fewer samples are kept the nearer they are.
+    sparsity
+        Of the published sampling: samples at a distance d beyond that are kept with the probability exp(-sparsity d),
+        d in sides of the cube.
     mesh_time_limit
         Seconds after which a tetwild run is stopped.
 
@@ -62,10 +71,13 @@ class FitOptions:
     seed: int = 0
     stretch: StretchLaw = "linear"
     extra_turns: int = 0
+    sampling: Sampling = "graded"
+    threshold: float = 1.0
+    sparsity: float = 12.0
     mesh_time_limit: float = 120.0
 
     def __post_init__(self) -> None:
-        _require_choices(self, {"engine": Engine, "quality": Quality, "stretch": StretchLaw})
+        _require_choices(self, {"engine": Engine, "quality": Quality, "stretch": StretchLaw, "sampling": Sampling})
         _require_whole(self.seed, "seed")
         _require_whole(self.extra_turns, "number of extra turns")
         if not -_MOST_TURNS <= self.extra_turns <= _MOST_TURNS:
@@ -74,8 +86,15 @@ class FitOptions:
             )
         if self.seed < 0:
             raise InputError(f"The seed is {self.seed}; it must be 0 or more.")
+        for value, name, most in ((self.threshold, "threshold", 10.0), (self.sparsity, "sparsity", 100.0)):
+            if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= value <= most:
+                raise InputError(f"The {name} of the sampling is {value!r}; it must be a number from 0 to {most:g}.")
         if self.quality == "exact" and self.engine == "tetwild":
             raise InputError("The quality exact fills the volume by the engine delaunay; choose that, or auto.")
+        if self.sampling == "published" and (self.engine != "delaunay" or self.quality == "exact"):
+            raise InputError(
+                "The published sampling belongs to the engine delaunay and a quality other than exact; choose those."
+            )
         limit = self.mesh_time_limit
         if not isinstance(limit, Real) or isinstance(limit, bool) or not limit > 0.0:
             raise InputError(f"The time limit of meshing is {limit!r}; it must be a positive number of seconds.")
@@ -83,7 +102,8 @@ class FitOptions:
     @property
     def identity(self) -> str:
         """The options as one string; fits with the same string are interchangeable."""
-        return f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
+        text = f"{self.engine} {self.quality} {self.seed} {self.stretch} {self.extra_turns}"
+        return text if self.sampling == "graded" else f"{text} published {self.threshold} {self.sparsity}"
 
 
 class FitChoices(TypedDict, total=False):
@@ -94,6 +114,9 @@ class FitChoices(TypedDict, total=False):
     seed: int
     stretch: StretchLaw
     extra_turns: int
+    sampling: Sampling
+    threshold: float
+    sparsity: float
     mesh_time_limit: float
 
 

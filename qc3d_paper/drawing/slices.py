@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib
 import numpy as np
@@ -29,7 +30,30 @@ _ONE = np.array([[0, 1], [0, 2], [0, 3], [0, 3]])
 _TWO = np.array([[0, 2], [0, 3], [1, 3], [1, 2]])
 
 
-def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floats]:
+class Cuts(NamedTuple):
+    """Where a plane cuts tetrahedra: polygons of four corners on edges; a triangle has its last corner twice.
+
+    Parameters
+    ----------
+    tets : (k,) int64
+        The tetrahedra that are cut.
+    ends : (k, 4, 2) int64
+        The vertices at the ends of each corner's edge.
+    parts : (k, 4)
+        How far along its edge each corner lies, 0..1.
+    """
+
+    tets: Ints
+    ends: Ints
+    parts: Floats
+
+    def of(self, values: Floats) -> Floats:
+        """(k, 4, 3) the corners of the polygons where the vertices are at ``values`` (N, 3)."""
+        first, second = values[self.ends[..., 0]], values[self.ends[..., 1]]
+        return np.asarray(first + self.parts[..., None] * (second - first))
+
+
+def cuts(points: Floats, tets: Ints, axis: int, place: float) -> Cuts:
     """Cut tetrahedra by an axis-aligned plane.
 
     Parameters
@@ -42,29 +66,24 @@ def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floa
         Axis perpendicular to the plane: 0, 1 or 2.
     place : float
         Coordinate of the plane along that axis.
-
-    Returns
-    -------
-    rows : (k,) int64
-        The tetrahedra that are cut.
-    polygons : (k, 4, 2)
-        Corners of the cuts in the other two coordinates, in order around the polygon. A triangle has its last corner
-        twice.
     """
     above = points[tets, axis] > place
     count = above.sum(axis=1)
-    rest = [other for other in range(3) if other != axis]
-    cuts, polygons = [], []
+    found = []
     for number, side, ends in ((1, above, _ONE), (3, ~above, _ONE), (2, above, _TWO)):
         rows = np.flatnonzero(count == number)
         # Corners sorted so that the single one comes first, or the two above the plane.
         order = np.argsort(~side[rows], axis=1, kind="stable")
-        corners = points[np.take_along_axis(tets[rows], order, axis=1)]
-        first, second = corners[:, ends[:, 0]], corners[:, ends[:, 1]]
-        part = (place - first[..., axis]) / (second[..., axis] - first[..., axis])
-        polygons.append((first + part[..., None] * (second - first))[..., rest])
-        cuts.append(rows)
-    return np.concatenate(cuts), np.concatenate(polygons)
+        corners = np.take_along_axis(tets[rows], order, axis=1)[:, ends]
+        along = points[corners, axis]
+        found.append(Cuts(rows, corners, (place - along[..., 0]) / (along[..., 1] - along[..., 0])))
+    return Cuts(*(np.concatenate(column) for column in zip(*found, strict=True)))
+
+
+def cut(points: Floats, tets: Ints, axis: int, place: float) -> tuple[Ints, Floats]:
+    """The tetrahedra (k,) that a plane cuts, as ``cuts``, and polygons (k, 4, 2) in the other two coordinates."""
+    found = cuts(points, tets, axis, place)
+    return found.tets, found.of(points)[..., [other for other in range(3) if other != axis]]
 
 
 def draw_slice(axes: Axes, analysis: Analysis, axis: int, place: float, measure: str) -> None:

@@ -17,7 +17,7 @@ from qc3d_addon.solver.maps.mapping import Mapping
 from qc3d_addon.solver.maps.reconstruction import reconstruct
 from qc3d_addon.solver.tets.mesh import TetMesh
 
-from ..drawing.cubes import draw_cube
+from ..drawing.cubes import draw_cube, draw_open_cube
 from ..drawing.slices import cut
 from . import shapes
 from .caption import Caption
@@ -26,6 +26,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 
 BIJECTIONS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
     "3": ("every coordinate stretched by itself", shapes.along_axes),
@@ -41,21 +42,27 @@ def draw(number: str, title: str, mapping: Mapping, file: BinaryIO) -> Caption:
     mesh = mapping.mesh
     rebuilt = reconstruct(mesh, mapping.stretch, Conditions.sliding_cube(mesh))
     error = np.linalg.norm(rebuilt.values - mapping.values, axis=1)
-    figure, panels = pyplot.subplots(1, 4, figsize=(16, 4.2), layout="constrained")
-    draw_cube(panels[0], mesh, mesh.points)
-    panels[0].set_title("the cube")
-    draw_cube(panels[1], mesh, rebuilt.values)
-    panels[1].set_title("rebuilt from the representation")
-    _draw_slice(panels[2], mapping, rebuilt)
-    panels[3].hist(np.log10(np.maximum(error, 1e-17)), 40, color="0.4")
-    panels[3].set_xlabel("log₁₀ of a vertex's error")
-    panels[3].set_ylabel("vertices")
+    figure = pyplot.figure(figsize=(16, 7.6), layout="constrained")
+    panels = figure.subplots(2, 3)
+    for column, shown, name in ((0, mapping, "target"), (1, rebuilt, "rebuilt from the representation")):
+        draw_cube(panels[0, column], mesh, shown.values)
+        panels[0, column].set_title(name)
+        drawn = _draw_slice(panels[1, column], shown)
+        panels[1, column].set_title(f"{name}: cut at z = ½")
+    figure.colorbar(drawn, ax=panels[1, :2], label="volume ratio, log₂", shrink=0.9)
+    draw_open_cube(panels[0, 2], mesh, rebuilt.values)
+    panels[0, 2].set_title("rebuilt: the planes z = ¼, ½, ¾")
+    panels[1, 2].hist(np.log10(np.maximum(error, 1e-17)), 40, color="0.4")
+    panels[1, 2].xaxis.set_major_locator(MaxNLocator(5))
+    panels[1, 2].set_xlabel("error of a vertex, log₁₀ of cube sides")
+    panels[1, 2].set_ylabel("vertices")
+    panels[1, 2].set_title("distance of rebuilt from target")
     figure.savefig(file, dpi=100)
     pyplot.close(figure)
     largest = float(error.max())
     return Caption(
         number,
-        f"{title}: the cube, the rebuilt map, a slice, and the error",
+        f"{title}: target and rebuilt map, slices, the inside, and the error",
         _CLAIM,
         f"{len(mesh.points)} vertices, {len(mesh.tets)} tetrahedra, dilatation up to "
         f"{np.linalg.cond(mapping.stretch).max():.3g}: largest error {largest:.1e} of the cube's side, "
@@ -82,13 +89,15 @@ def without_folds(mesh: TetMesh, title: str, bijection: Callable[[Floats], Float
     raise InputError(f"The mesh is too coarse for this map: {title}.")
 
 
-def _draw_slice(axes: Axes, mapping: Mapping, rebuilt: Mapping) -> None:
+def _draw_slice(axes: Axes, mapping: Mapping) -> PolyCollection:
     """Draw a slice through the middle of the cube after the map, colored by the volume ratio."""
-    rows, polygons = cut(rebuilt.values, mapping.mesh.tets, 2, 0.5)
+    rows, polygons = cut(mapping.values, mapping.mesh.tets, 2, 0.5)
     ratio = np.log2(np.linalg.det(mapping.jacobians)[rows])
     drawn = PolyCollection(list(polygons), array=ratio, cmap="coolwarm", edgecolor="0.3", linewidth=0.2)
     drawn.set_clim(-2.0, 2.0)
     axes.add_collection(drawn)
     axes.set_aspect("equal")
     axes.autoscale()
-    axes.set_title("slice z = ½; log₂ of the volume ratio, −2 … 2")
+    axes.set_xlabel("x")
+    axes.set_ylabel("y")
+    return drawn

@@ -8,6 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table, with what comes before and after it kept apart."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n\n" + "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n\n"
+
+
 @dataclass(frozen=True)
 class Caption:
     """The caption of one figure.
@@ -36,5 +42,5 @@ class Caption:
         """Markdown of the figure, whose picture is in the same folder, and its caption."""
         return (
             f"## Figure {self.figures}: {self.title}\n\n![{self.title}]({picture.name})\n\n"
-            f"**The paper claims:** {self.claim}\n\n**Measured:** {self.measured}\n\n**Holds?** {self.holds}\n"
+            f"**The paper claims:** {self.claim}\n\n**Measured:** {self.measured.rstrip()}\n\n**Holds?** {self.holds}\n"
         )

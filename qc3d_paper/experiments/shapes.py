@@ -22,6 +22,7 @@ from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 
 OPTIONS = FitOptions(quality="fine")
+PUBLISHED = FitOptions(sampling="published")
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 
@@ -72,15 +73,15 @@ def read(pose: Pose, data: Path | None) -> KeyPair:
     return pair
 
 
-def fitted(pair: KeyPair) -> FittedMap:
+def fitted(pair: KeyPair, options: FitOptions | None = None) -> FittedMap:
     """The fold-free map of the cube that carries the first shape onto the second."""
-    return finish(fit_pair(pair, OPTIONS))
+    return finish(fit_pair(pair, options or OPTIONS))
 
 
-def cube() -> TetMesh:
+def cube(options: FitOptions | None = None) -> TetMesh:
     """A mesh of the unit cube, finest around a sphere in its middle."""
     points, faces = _ball()
-    return fill_cube(points, faces, OPTIONS).mesh
+    return fill_cube(points, faces, options or OPTIONS).mesh
 
 
 def _ball(rings: int = 16, radius: float = 0.3) -> tuple[Floats, Ints]:

@@ -1,218 +1,230 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 8 to 13 (section 6.2): two maps compressed by their lowest modes, three figures for each."""
+"""Figures 8 to 13 (section 6.2): maps compressed by their lowest modes, three figures for each two of them."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from pathlib import Path
+from textwrap import fill
 from typing import BinaryIO
 
 import matplotlib
 import numpy as np
 
 from qc3d_addon.solver.arrays import Floats
-from qc3d_addon.solver.compression.codec import Codec, Scheme
-from qc3d_addon.solver.compression.modes import Transfer
-from qc3d_addon.solver.compression.transfer_loss import transferred
-from qc3d_addon.solver.errors import ReconstructionError
-from qc3d_addon.solver.maps.boundary_conditions import Conditions
-from qc3d_addon.solver.maps.mapping import Mapping
 
-from ..drawing.cubes import draw_cube
-from . import shapes
-from .caption import Caption
-from .shapes import Pose
+from ..drawing.cubes import draw_cube, draw_open_cube
+from .caption import Caption, table
+from .experiment import FITTED_COUNTS, NUMBERS, Experiment, Way
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
+from matplotlib.axes import Axes
 
-_MODES = 400  # computing all modes of a mesh would take too long
-_SHOWN = 60  # modes in the pictures of the cube
-_COUNTS = (1, 2, 4, 8, 16, 30, 60, 120, 240, 400)
-_FITTED_COUNTS = (4, 16, 60, 240)  # fewer, because each needs an optimization
+_SHOWN = 60  # modes of the representation in the pictures of the cube
+_COUNTS = (1, 2, 4, 8, 16, 30, 60, 120, 240, 500, 1000, 2000)
+_NARROW = 34  # characters of a line in a figure
 _WINDOW = 15  # modes in the moving average of the spectra
 _CHANNELS = ("xx", "xy", "xz", "yy", "yz", "zz")
-_EXACTLY = 1e-9  # a quantization step so small that rounding does not matter
-_LINES = {"coordinates": "k--o", "published": "C1-o", "logarithm": "C0-o", "fitted": "C2-s"}
-_LABELS = {
-    "coordinates": "coordinates",
-    "published": "published: P",
-    "logarithm": "logarithm: log P",
-    "fitted": "fitted: nearest map, equal weights (ours)",
+_LINES: dict[Way, str] = {
+    "coordinates": "k--o",
+    "displacements": "C7--o",
+    "put back": "C4--o",
+    "published": "C1-o",
+    "logarithm": "C0-o",
+    "fitted": "C2-s",
 }
-_SCHEMES: tuple[Scheme, ...] = ("published", "logarithm", "fitted")
+_LABELS: dict[Way, str] = {
+    "coordinates": "coordinates",
+    "displacements": "displacements",
+    "put back": "displacements, boundary put back",
+    "published": "representation, published: P",
+    "logarithm": "representation: log P",
+    "fitted": "representation: nearest map (ours)",
+}
+_EQUAL = 6 * _SHOWN  # numbers at which ways are compared at equal storage
+_FLAT = 1.5  # a mean square error that grows by less than half down to a tenth of the modes is called flat
 
 
-class Experiment:
-    """One map and everything that its three figures need, computed once.
-
-    Parameters
-    ----------
-    pose : Pose
-        The map carries the first shape of this pose onto the second.
-    data : Path, optional
-        Folder of the shapes, if they are not from a demo file.
-    """
-
-    def __init__(self, pose: Pose, data: Path | None) -> None:
-        self.pose = pose
-        fitted = shapes.fitted(shapes.read(pose, data))
-        self.mapping = Mapping(fitted.mesh, fitted.mapped)
-        self.modes = min(_MODES, len(fitted.mesh.points) - 2)
-        moved = fitted.mapped - fitted.mesh.points
-        self.reference = float((moved**2).sum(axis=1).mean())
-
-    @cached_property
-    def codecs(self) -> dict[Scheme, Codec]:
-        """The codec of each scheme."""
-        mesh = self.mapping.mesh
-        first = Codec(mesh, self.modes, "published")
-        return {
-            "published": first,
-            "logarithm": Codec(mesh, self.modes, "logarithm", known=first.spectrum),
-            "fitted": Codec(mesh, self.modes, "fitted"),
+def draw_cubes(number: str, experiments: list[Experiment], file: BinaryIO) -> Caption:
+    """Draw boundary and inside of the cube after the maps and after their truncations, at equal storage."""
+    figure, panels = pyplot.subplots(
+        2 * len(experiments), 4, figsize=(15, 7.2 * len(experiments)), layout="constrained", squeeze=False
+    )
+    rows: list[list[str]] = []
+    kept_everywhere, wins = True, []
+    for row, experiment in enumerate(experiments):
+        few = min(_SHOWN, experiment.modes // 2)
+        published = experiment.restored("published", few)
+        way: Way = "logarithm" if published is None else "published"
+        shown = {
+            "the map": experiment.mapping.values,
+            f"coordinates\n{2 * few} modes, {6 * few} numbers": _restored(experiment, "coordinates", 2 * few),
+            f"displacements\n{2 * few} modes, {6 * few} numbers": _restored(experiment, "displacements", 2 * few),
+            f"{'log P' if published is None else 'P'}\n{few} modes, {6 * few} numbers": _restored(experiment, way, few),
         }
-
-    def restored(self, scheme: Scheme, modes: int) -> Mapping | None:
-        """The map restored from its first modes without quantization; None if the truncated form has no map."""
-        codec = self.codecs[scheme]
-        targets = self.mapping.values[None]
-        try:
-            _, rebuilt = codec.rounded(targets, codec.coefficients(targets, modes), _EXACTLY)
-        except ReconstructionError:
-            return None
-        return Mapping(self.mapping.mesh, rebuilt[0])
-
-    def transferred(self, scheme: Scheme) -> Mapping | None:
-        """The map after the transfer from tetrahedra to vertices and back, with all modes kept."""
-        return transferred(self.mapping, scheme, Conditions.sliding_cube(self.mapping.mesh))
-
-    def coordinates(self, modes: int) -> Floats:
-        """(N, 3) the map whose displacements are truncated to their first modes, for comparison."""
-        mesh = self.mapping.mesh
-        basis = self.codecs["published"].spectrum.modes[:, :modes]
-        weighted = Transfer(mesh).vertex_volumes[:, None] * (self.mapping.values - mesh.points)
-        return np.asarray(mesh.points + basis @ (basis.T @ weighted))
-
-    def error(self, values: Floats) -> float:
-        """Mean square distance of values (N, 3) from the map, squared cube units."""
-        return float(((values - self.mapping.values) ** 2).sum(axis=1).mean())
-
-
-def draw_cubes(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """Draw the cube's faces after the map, and after truncation of its coordinates and of its representation."""
-    mapping, modes = experiment.mapping, min(_SHOWN, experiment.modes)
-    mesh = mapping.mesh
-    coordinates = experiment.coordinates(modes)
-    restored = experiment.restored("logarithm", modes)
-    assert restored is not None
-    figure, panels = pyplot.subplots(2, 3, figsize=(11, 7.4), layout="constrained")
-    for column, values, title in (
-        (panels[:, 0], mapping.values, "the map"),
-        (panels[:, 1], coordinates, f"coordinates, {modes} modes"),
-        (panels[:, 2], restored.values, f"representation (log P), {modes} modes"),
-    ):
-        draw_cube(column[0], mesh, values)
-        draw_cube(column[1], mesh, values, behind=True)
-        column[0].set_title(title)
-    figure.savefig(file, dpi=100)
+        for column, (title, values) in enumerate(shown.items()):
+            draw_cube(panels[2 * row, column], experiment.mesh, values)
+            draw_open_cube(panels[2 * row + 1, column], experiment.mesh, values)
+            panels[2 * row, column].set_title(title)
+        panels[2 * row, 0].set_ylabel(f"{_narrow(experiment.title)}\nboundary")
+        panels[2 * row + 1, 0].set_ylabel("inside: the planes z = ¼, ½, ¾")
+        measured: list[tuple[Way, int]] = [
+            ("coordinates", few),
+            ("displacements", few),
+            ("coordinates", 2 * few),
+            ("displacements", 2 * few),
+            ("put back", 2 * few),
+            (way, few),
+        ]
+        found = [_restored(experiment, name, count) for name, count in measured]
+        for (name, count), values in zip(measured, found, strict=True):
+            cells = [experiment.title, _LABELS[name], str(count), str(NUMBERS[name] * count)]
+            rows.append(cells + _errors(experiment, values))
+        coordinates, _, put_back, representation = found[2:]
+        kept_everywhere &= _leaving(experiment, representation) == 0.0 < _leaving(experiment, coordinates)
+        inside = ~experiment.on_boundary
+        wins.append(
+            f"{experiment.title}: representation {experiment.error(representation, inside):.2g}, coordinates "
+            f"{experiment.error(coordinates, inside):.2g}, displacements with the boundary put back "
+            f"{experiment.error(put_back, inside):.2g}"
+        )
+    figure.savefig(file, dpi=80)
     pyplot.close(figure)
-    held = mesh.on_cube_face
-    moved, kept = (float(np.abs(values - mesh.points)[held].max()) for values in (coordinates, restored.values))
-    folds = Mapping(mesh, coordinates).folds
     return Caption(
         number,
-        f"{experiment.pose.label}: the cube after {modes} modes of coordinates and of the representation",
-        "Compressed coordinates move the cube's boundary; the compressed representation keeps it.",
-        f"coordinates leave the faces by up to {moved:.2g} and fold {folds} of {len(mesh.tets)} tetrahedra; "
-        f"the representation leaves them by {kept:.2g} and folds {restored.folds}. Mean square error: coordinates "
-        f"{experiment.error(coordinates):.2g}, representation {experiment.error(restored.values):.2g}.",
-        "Yes." if kept == 0.0 < moved else "No.",
+        "; ".join(experiment.title for experiment in experiments)
+        + ": boundary and inside after truncation, at equal storage",
+        "Compressed coordinates move the boundary of the cube; the compressed representation keeps it.",
+        "Mean square errors in squared sides of the cube, and how far the faces are left."
+        + table(["map", "what", "modes", "numbers", "boundary", "inside", "faces left by", "folds"], rows),
+        f"{'Yes' if kept_everywhere else 'No'}, for the boundary. The inside, at equal storage: {'; '.join(wins)}.",
     )
 
 
-def draw_spectrum(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """Draw the magnitude of the six channels' coefficients by mode."""
-    codec, mesh = experiment.codecs["published"], experiment.mapping.mesh
-    coefficients = np.abs(codec.projected(experiment.mapping, experiment.modes))
-    figure, panels = pyplot.subplots(2, 3, figsize=(11, 5.4), sharex=True, sharey=True, layout="constrained")
-    window = np.ones(_WINDOW)
-    for axes, name, channel in zip(panels.ravel(), _CHANNELS, coefficients.T, strict=True):
-        modes = np.arange(1, len(channel) + 1)
-        axes.semilogy(modes, np.maximum(channel, 1e-12), ".", markersize=2.5, color="0.6")
-        inner = channel[1:]  # the constant mode, which contains the identity, is not averaged with the others
-        mean = np.sqrt(np.convolve(inner**2, window, "same") / np.convolve(np.ones_like(inner), window, "same"))
-        axes.semilogy(modes[1:], np.maximum(mean, 1e-12), color="C0", linewidth=1.5)
-        axes.set_title(name, fontsize=10)
-        axes.set_ylim(max(coefficients[1:].max() * 1e-4, 1e-12), max(coefficients.max() * 2.0, 1e-11))
-    figure.supxlabel("mode")
-    figure.supylabel(f"size of the coefficient; blue: root mean square of {_WINDOW}")
-    figure.savefig(file, dpi=100)
+def _restored(experiment: Experiment, way: Way, modes: int) -> Floats:
+    values = experiment.restored(way, modes)
+    assert values is not None  # only P itself, cut off, may be no representation
+    return values
+
+
+def _errors(experiment: Experiment, values: Floats) -> list[str]:
+    """Cells of a table: errors at the boundary and inside, how far the faces are left, and folds."""
+    errors = [experiment.error(values, at) for at in (experiment.on_boundary, ~experiment.on_boundary)]
+    return [*(f"{number:.2g}" for number in (*errors, _leaving(experiment, values))), str(experiment.folds(values))]
+
+
+def _leaving(experiment: Experiment, values: Floats) -> float:
+    """How far a map moves the cube's faces out of their planes at most."""
+    return float(np.abs(values - experiment.mesh.points)[experiment.mesh.on_cube_face].max())
+
+
+def draw_spectrum(number: str, experiments: list[Experiment], file: BinaryIO) -> Caption:
+    """Draw the size of the coefficients of the six channels against the mode, all modes."""
+    figure, panels = pyplot.subplots(
+        len(experiments), 6, figsize=(17, 3.3 * len(experiments)), sharey="row", layout="constrained", squeeze=False
+    )
+    window, shares = np.ones(_WINDOW), []
+    for row, experiment in enumerate(experiments):
+        sizes = np.abs(experiment.channels)
+        for axes, name, channel in zip(panels[row], _CHANNELS, sizes.T, strict=True):
+            modes = np.arange(1, len(channel) + 1)
+            axes.semilogy(modes, np.maximum(channel, 1e-12), ".", markersize=2, color="0.65")
+            inner = channel[1:]  # the constant mode, which holds the identity, is a point of its own
+            mean = np.sqrt(np.convolve(inner**2, window, "same") / np.convolve(np.ones_like(inner), window, "same"))
+            axes.semilogy(modes[1:], np.maximum(mean, 1e-12), color="C0", linewidth=1.2)
+            axes.set_title(name)
+            axes.set_xlabel("mode")
+        panels[row, 0].set_ylim(max(sizes[1:].max() * 1e-4, 1e-12), sizes.max() * 2.0)
+        panels[row, 0].set_ylabel(f"{_narrow(experiment.title)}\nsize of the coefficient")
+        weights = np.where([name[0] == name[1] for name in _CHANNELS], 1.0, 2.0)
+        energy = (sizes[1:] ** 2) @ weights
+        tenth = max(1, len(energy) // 10)
+        shares.append(float(energy[:tenth].sum() / energy.sum()))
+    figure.savefig(file, dpi=90)
     pyplot.close(figure)
-    # Without the constant mode, which contains the identity.
-    energy = (coefficients[1:] ** 2).sum(axis=1)
-    tenth = max(1, len(energy) // 10)
-    share = float(energy[:tenth].sum() / energy.sum())
-    transfer = Transfer(mesh)
-    at_vertices = transfer.to_vertices @ (experiment.mapping.stretch - np.eye(3)).reshape(-1, 9)
-    every = float((transfer.vertex_volumes[:, None] * at_vertices**2).sum())
-    identity = codec.projected(Mapping(mesh, mesh.points), experiment.modes)
-    caught = float(((codec.projected(experiment.mapping, experiment.modes) - identity) ** 2).sum()) / every
+    measured = "; ".join(
+        f"{experiment.title}, {experiment.modes} modes: {share:.0%}"
+        for experiment, share in zip(experiments, shares, strict=True)
+    )
+    verdicts = "; ".join(
+        f"{experiment.title}: {'yes' if share > 0.8 else 'in part' if share > 0.3 else 'no'}"
+        for experiment, share in zip(experiments, shares, strict=True)
+    )
     return Caption(
         number,
-        f"{experiment.pose.label}: spectra of the six channels",
+        "spectra of the six channels of P, all modes",
         "The spectra are concentrated at low frequencies.",
-        f"of the energy in {experiment.modes} modes, the constant one left out, the lowest tenth has {share:.0%}; all "
-        f"of them have {caught:.0%} of what the vertices have of P − I.",
-        "Yes."
-        if share > 0.8
-        else "In part: low modes are larger, but much is spread over the others."
-        if share > 0.3
-        else "No.",
+        f"Share that the lowest tenth of the modes has of the energy of all, without the constant mode: {measured}. "
+        "xy, xz and yz are drawn as they are; since each stands twice in P, their squares count twice in the energy, "
+        f"which is as if they were multiplied by √2. Blue: root mean square of {_WINDOW} modes.",
+        f"{_overall([share > 0.8 for share in shares])}. {verdicts}.",
     )
 
 
-def draw_errors(number: str, experiment: Experiment, file: BinaryIO) -> Caption:
-    """Draw the mean square error by the number of modes, and that between source and target for comparison."""
-    every = [count for count in _COUNTS if count <= experiment.modes]
-    counts: dict[str, list[int]] = {"coordinates": every, "published": every, "logarithm": every}
-    counts["fitted"] = [count for count in _FITTED_COUNTS if count <= experiment.modes]
-    reached = {"coordinates": [experiment.error(experiment.coordinates(count)) for count in every]}
-    transfers, lost = [], 0
-    for scheme in _SCHEMES:
-        restored = [experiment.restored(scheme, count) for count in counts[scheme]]
-        lost += sum(found is None for found in restored)
-        reached[scheme] = [np.nan if found is None else experiment.error(found.values) for found in restored]
-        transfers.append(_part_of(experiment, experiment.transferred(scheme)))
-    figure, axes = pyplot.subplots(figsize=(9, 4.8), layout="constrained")
-    for label, errors in reached.items():
-        axes.loglog(counts[label], errors, _LINES[label], markersize=4, label=_LABELS[label])
-    axes.axhline(experiment.reference, color="0.4", linewidth=1.0, label="source to target")
-    axes.axhline(transfers[0] * experiment.reference, color="C1", linestyle=":", label="published, transfer alone")
-    axes.set_xlabel("modes")
-    axes.set_ylabel("mean square error, cube units")
-    axes.legend(fontsize=9)
-    figure.savefig(file, dpi=100)
+def draw_errors(number: str, experiments: list[Experiment], file: BinaryIO) -> Caption:
+    """Draw the mean square error against the number of modes and against how many numbers are stored."""
+    figure, panels = pyplot.subplots(
+        len(experiments), 2, figsize=(13, 4.6 * len(experiments)), sharey="row", layout="constrained", squeeze=False
+    )
+    rows: list[list[str]] = []
+    verdicts, flat = [], []
+    for row, experiment in enumerate(experiments):
+        every = [*(count for count in _COUNTS if count < experiment.modes), experiment.modes]
+        counts: dict[Way, list[int]] = dict.fromkeys(_LABELS, every)
+        counts["fitted"] = [count for count in FITTED_COUNTS if count <= experiment.modes]
+        reached = {way: _parts(experiment, way, found) for way, found in counts.items()}
+        transfer = experiment.transfer_part("published")
+        for axes, numbers, label in ((panels[row, 0], False, "modes"), (panels[row, 1], True, "numbers stored")):
+            _draw_lines(axes, counts, reached, numbers)
+            axes.axhline(1.0, color="0.4", linewidth=1.0, label="source to target")
+            axes.axhline(transfer, color="C1", linestyle=":", label="published, transfer alone")
+            axes.set_xlabel(label)
+            axes.set_title(f"{_narrow(experiment.title)}\nby {label}", fontsize=10)
+        panels[row, 0].set_ylabel("mean square error, of that from source to target")
+        panels[row, 0].set_ylim(1e-5, None)
+        panels[row, 1].legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        for way, found in reached.items():
+            at = [_at(counts[way], found, count) for count in (_SHOWN // 2, _SHOWN, _EQUAL // NUMBERS[way])]
+            whole = found[-1] if counts[way][-1] == experiment.modes else np.nan
+            parts = [f"{part:.2%}" if np.isfinite(part) else "–" for part in (whole, *at)]
+            rows.append([experiment.title, _LABELS[way], *parts])
+        rows.append([experiment.title, "published, transfer alone", f"{transfer:.2%}", "–", "–", "–"])
+        tenth = _at(every, reached["published"], experiment.modes // 10)
+        growth = tenth / reached["published"][-1]
+        flat.append(bool(growth < _FLAT))
+        verdicts.append(f"{experiment.title}: from all modes to a tenth the error grows {growth:.2g} times")
+    figure.savefig(file, dpi=90)
     pyplot.close(figure)
-    told = ", ".join(
-        f"{label} {reached[label][-1] / experiment.reference:.2%} with {counts[label][-1]} modes" for label in reached
-    )
-    few = max(count for count in every if count <= max(every[-1] // 4, 1))
-    growth = reached["published"][every.index(few)] / reached["published"][-1]
-    without = f"; {lost} truncations had no map" if lost else ""
     return Caption(
         number,
-        f"{experiment.pose.label}: error by the number of modes",
-        "The error is flat until few modes are left.",
-        f"of the mean square error between source and target there is left: {told}{without}. The transfer between "
-        f"tetrahedra and vertices alone, all modes kept, leaves {transfers[0]:.2%} (published), {transfers[1]:.2%} "
-        f"(logarithm), {transfers[2]:.2%} (fitted: nearest vertex values). From {every[-1]} to {few} modes the "
-        f"published scheme's error grows by a factor of {growth:.2g}.",
-        "Yes." if growth < 1.1 else "In part: it grows slowly." if growth < 2.0 else "No: it grows all the way.",
+        "error by the number of modes, and by how many numbers are stored",
+        "The error stays about the same until few modes are left.",
+        "What is left of the mean square error between source and target."
+        + table(["map", "what", "all modes", f"{_SHOWN // 2}", f"{_SHOWN}", f"{_EQUAL} numbers"], rows),
+        f"{_overall(flat)}. {'; '.join(verdicts)}.",
     )
 
 
-def _part_of(experiment: Experiment, restored: Mapping | None) -> float:
-    """Mean square error relative to that between source and target; NaN without a map."""
-    return np.nan if restored is None else experiment.error(restored.values) / experiment.reference
+def _parts(experiment: Experiment, way: Way, counts: list[int]) -> list[float]:
+    """Mean square errors over that between source and target, NaN where a truncation has no map."""
+    restored = (experiment.restored(way, count) for count in counts)
+    return [np.nan if found is None else experiment.error(found) / experiment.reference for found in restored]
+
+
+def _draw_lines(axes: Axes, counts: dict[Way, list[int]], reached: dict[Way, list[float]], is_storage: bool) -> None:
+    for way, parts in reached.items():
+        places = np.array(counts[way]) * (NUMBERS[way] if is_storage else 1)
+        axes.loglog(places, np.maximum(parts, 1e-30), _LINES[way], markersize=3.5, label=_LABELS[way])
+
+
+def _at(counts: list[int], parts: list[float], count: int) -> float:
+    """The value at a number of modes, between those that were computed by a power law."""
+    return float(np.exp(np.interp(np.log(max(count, 1)), np.log(counts), np.log(np.maximum(parts, 1e-300)))))
+
+
+def _narrow(title: str) -> str:
+    return fill(title, _NARROW)
+
+
+def _overall(holds: list[bool]) -> str:
+    return "Yes" if all(holds) else "In part" if any(holds) else "No"

@@ -189,7 +189,7 @@ def test_the_scale_holds_nearly_all_values() -> None:
     values = np.ones((3, 1000), dtype=np.float32)
     assert scale_of("stretch", values).ticks == [(0.0, "0.98"), (0.5, "1"), (1.0, "1.02")]
     values[1, :500] = 0.6
-    values[2, 0] = 50.0  # one vertex does not make the rest grey
+    values[2, 0] = 50.0  # one vertex does not make the rest gray
     assert scale_of("volume", values)[1:3] == (0.5, 2.0)
     values[1, :500] = 2.9
     assert scale_of("dilatation", values).ticks == [(0.0, "1"), (0.5, "1.73"), (1.0, "3")]

@@ -280,3 +280,21 @@ def test_left_alone_it_is_the_key_where_it_can_be(figure: bpy.types.Object) -> N
     bake(to_key="Stretch", from_key="Lean")
     assert chain_of(figure).on_key == ""
     assert "Lean_to_Stretch" in figure
+
+
+def test_drivers_move_values_only_and_need_no_scripts(figure: bpy.types.Object) -> None:
+    """A driver of ``mute`` lets Blender's threads write values of the frame before back; an earlier bake's goes."""
+    bake(count=3)
+    keys = figure.data.shape_keys
+    driver = keys.driver_add('key_blocks["Lean_50"].mute').driver
+    driver.type = 'AVERAGE'
+    variable = driver.variables.new()
+    variable.name, target = "slider", variable.targets[0]
+    target.id_type, target.id, target.data_path = 'KEY', keys, 'key_blocks["Lean"].mute'
+    keys.key_blocks["Lean_50"].mute = True
+    bake(count=3, quality="fine")
+    assert not keys.key_blocks["Lean_50"].mute
+    made = list(keys.animation_data.drivers)
+    assert len(made) == 3
+    assert all(curve.data_path.endswith("].value") for curve in made)
+    assert all(curve.driver.is_simple_expression for curve in made)

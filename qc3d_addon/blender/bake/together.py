@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several objects of one character baked in one map: lashes stay on lids, clothes on skin."""
+"""Bakes several objects of one character in one map, so that lashes stay on lids and clothes on skin."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class JointPlan:
     Parameters
     ----------
     plans
-        Of each object by itself, the active one first.
+        Plan of each object by itself, the active one first.
     together
-        Their meshes joined, as the active object sees them.
+        The joined meshes, in the coordinates of the active object.
     task
-        The work on the joined meshes.
+        The task for the joined meshes.
     """
 
     plans: list[Plan]
@@ -51,9 +51,9 @@ def plan_together(objects: Sequence[bpy.types.Object], request: BakeRequest) -> 
     Parameters
     ----------
     objects
-        Each once.
+        The objects, without repetitions.
     request
-        The same for all.
+        The request for all of them.
 
     Raises
     ------
@@ -93,12 +93,12 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
     Parameters
     ----------
     one_control
-        Whether what plays those of the first object drives the others, where nothing else does.
+        Whether the control of the first object drives those of the others, unless something else drives them.
 
     Raises
     ------
     InputError
-        If one of the objects is gone or was changed meanwhile; all are as they were.
+        If one of the objects was deleted or changed during the work; nothing is written then.
     """
     from ...solver.frames.task import Outcome as OwnOutcome
 
@@ -119,7 +119,7 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
 def objects_with_keys(
     active: bpy.types.Object, others: Sequence[bpy.types.Object], names: Sequence[str]
 ) -> list[bpy.types.Object]:
-    """The active object and those of the others that have shape keys of all these names, each mesh once."""
+    """The active object and those others that have shape keys of all these names, one object for each mesh."""
     found = {active.data: active}
     for obj in others:
         if checks.object_problem(obj) is None and all(name in keys_of(obj).key_blocks for name in names):
@@ -128,7 +128,7 @@ def objects_with_keys(
 
 
 def follow(follower: Control, leader: Control) -> None:
-    """Let a driver keep a control where another one is; one that has a driver or keyframes is left alone."""
+    """Drive a control by another one, unless it already has a driver or keyframes."""
     animation = follower.owner.animation_data
     if animation is not None and animation.drivers.find(follower.path) is not None:
         return

@@ -46,7 +46,7 @@ def mirror_chain(
     steps = chain_keys.all_owned_keys(keys, chain)
     base = chain_keys.base_key(keys, chain).name
     image = mirror_image(obj, use_topology)
-    partners = image.partners
+    partners, notes = image.partners, image.note()
     shapes = {step: image.of(key_coordinates(obj, key.name)) for step, key in steps.items()}
 
     through = tuple(_other_side(name, keys.reference_key.name) for name in chain.through)
@@ -78,7 +78,7 @@ def mirror_chain(
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
         bookkeeping.remember(obj, record, mirrored, measures, made, undo)
-    return mirrored, image.note()
+    return mirrored, notes
 
 
 def _require_mirror_image(

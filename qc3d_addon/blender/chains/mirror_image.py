@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of an object mirrored across x = 0, as far as its Basis is symmetric."""
+"""Mirrors shapes of an object whose Basis is at least nearly symmetric across x = 0."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _ROUNDING = 4.0 * float(np.finfo(np.float32).eps)
 
 @dataclass(frozen=True, eq=False)
 class MirrorImage:
-    """Which vertex is the mirror image of which.
+    """The mirror partners of an object's vertices.
 
     Parameters
     ----------
     rest : (n, 3)
         The Basis.
     partners : (n,)
-        For each vertex its mirror image, or what is nearest there.
+        For each vertex its partner, or the vertex nearest to its mirror image.
     has_partner : (n,)
-        Whether it has one.
+        Whether a vertex has a partner.
     """
 
     rest: NDArray[np.float32]
@@ -39,9 +39,9 @@ class MirrorImage:
     has_partner: NDArray[np.bool_]
 
     def of(self, shape: NDArray[np.float32]) -> NDArray[np.float32]:
-        """A shape (n, 3) mirrored: every vertex where the mirror image of its partner is.
+        """A shape (n, 3) mirrored: every vertex moves to the mirror image of its partner.
 
-        Bit for bit where the two are mirror images in the Basis, up to rounding; else as far from its place there.
+        This is exact if the two are mirror images in the Basis, up to rounding; otherwise their offsets are mirrored.
         """
         flipped = np.array([-1.0, 1.0, 1.0], dtype=np.float32)
         apart = np.abs(self.rest[self.partners] * flipped - self.rest).max(axis=1)
@@ -50,7 +50,7 @@ class MirrorImage:
         return np.where(is_exact[:, None], shape[self.partners] * flipped, moved)
 
     def note(self) -> list[str]:
-        """A sentence about vertices that have no mirror image, where there are any."""
+        """A sentence about vertices without a partner, if there are any."""
         lost = int((~self.has_partner).sum())
         if not lost:
             return []
@@ -61,17 +61,17 @@ class MirrorImage:
 
 
 def mirror_image(obj: bpy.types.Object, use_topology: bool) -> MirrorImage:
-    """The mirror image of an object's vertices in its Basis.
+    """The mirror partners of an object's vertices in its Basis.
 
     Parameters
     ----------
     use_topology
-        Whether what is at no mirrored place is looked for by how the mesh is built around what is.
+        Whether vertices without a partner at their mirrored position are matched by the topology around known partners.
 
     Raises
     ------
     InputError
-        If many vertices have none.
+        If too many vertices have no partner.
     """
     from scipy.spatial import cKDTree
 

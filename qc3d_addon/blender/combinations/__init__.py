@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape keys that are on at once, and the keys that make them move rightly together."""
+"""Combinations of shape keys: additional keys that correct others while they are on at once."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys that correct others where these are on at once, over the whole range of their values."""
+"""Makes correction keys for shape keys that are on at once, over the whole range of their values."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ _ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class Made:
-    """What was made for keys that are on at once.
+    """The result of combining keys.
 
     Parameters
     ----------
     combined : Combined
     is_sculpted : bool
-        Whether there was a shape of the user's own for all of them, which stays as it is.
+        Whether the user had sculpted a key for the combination, which stays as it is.
     crossings : int
-        The most pairs of triangles that cross in a shape and in none of the keys.
+        Largest number of pairs of triangles that cross in a corrected shape but in none of the keys.
     off : float
-        How far the sum is off, over the size.
+        Largest distance of the plain sum from the corrected shape, over the size.
     """
 
     combined: Combined
@@ -72,20 +72,20 @@ def combine(
     find_order: bool = True,
     options: FitOptions | None = None,
 ) -> Iterator[float | Made]:
-    """Make the keys that correct some keys of an object where these are on at once; in parts that can be stopped.
+    """Make the correction keys for some keys of an object, in steps that can be stopped.
 
-    The keys themselves, their in-betweens, and a shape of the user's own for all of them stay as they are: where there
-    is such a shape, it is met, and what is made leads there.
+    The keys themselves, their in-betweens, and a key that the user has sculpted for their combination stay as they are.
+    If there is such a key, the corrections lead to it.
 
     Parameters
     ----------
     obj
     chosen
-        Names of two keys or three, relative to the same key.
+        Names of two or three keys with the same base.
     find_order
-        Whether to find out which is the outer one; else they are named from the outer to the inner.
+        Whether to find the outer key; otherwise the keys are named from the outermost to the innermost.
     options
-        Of the fit that keeps shapes from crossing themselves.
+        Options of the fit that keeps shapes from crossing themselves.
 
     Yields
     ------
@@ -169,7 +169,7 @@ def finished(steps: Iterator[float | Made]) -> Made:
 
 
 def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
-    """Remove the keys that were made for a combination; sentences about those that stay, since drivers read them."""
+    """Remove the correction keys of a combination; sentences about those that stay because drivers read them."""
     keys = keys_of(obj)
     _require_unlocked(keys, [name for name, _ in combined.made])
     left = [one for one in combined_keys.read(keys) if one.keys != combined.keys]
@@ -210,7 +210,7 @@ def _write(
     earlier: Combined | None,
     known: list[Combined],
 ) -> Combined:
-    """Put corrections into keys: all of them or, where something fails, none. Those of an earlier time keep names."""
+    """Write the correction keys, all of them or, if anything fails, none. Existing ones keep their names."""
     keys = keys_of(obj)
     relative = keys.key_blocks[named[0]].relative_key
     start = key_coordinates(obj, relative.name)
@@ -242,9 +242,9 @@ def _write(
 
 
 def _drive(keys: bpy.types.Key, key: bpy.types.ShapeKey, named: Sequence[str], places: Sequence[float]) -> None:
-    """Let a key be on as far as its places are near, and not at all where one of the keys is muted.
+    """Drive a correction key by the values of the combined keys; it is 0 if one of these is muted.
 
-    An expression that is simple enough runs without the permission that scripts need.
+    The expression is simple enough for Blender to evaluate it without the permission that scripts need.
     """
     path = value_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
@@ -266,7 +266,7 @@ def _drive(keys: bpy.types.Key, key: bpy.types.ShapeKey, named: Sequence[str], p
 
 
 def _cardinal(variable: str, place: float) -> str:
-    """The polynomial that is 1 at a place and 0 at the others and at 0, as an expression."""
+    """The Lagrange polynomial that is 1 at one place and 0 at the others and at 0, as an expression."""
     others = [other for other in (0.0, *PLACES) if other != place]
     scale = 1.0 / float(np.prod([place - other for other in others]))
     parts = [variable if other == 0.0 else f"({variable}-{other:g})" for other in others]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of an object as its Mirror modifiers show them: the mirrored whole moves, and its seam stays on the plane."""
+"""Shapes of an object completed by its Mirror modifiers; vertices on the mirror plane stay on it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..store.mirror_modifiers import mirror_planes
 
 
 class MirroredShapes:
-    """Shapes of an object's mesh with their mirror images, where it has any.
+    """Shapes of an object's mesh, with their mirror images if it has Mirror modifiers.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class MirroredShapes:
     Attributes
     ----------
     shapes : tuple of (w, 3)
-        Those of the whole, the mesh's own vertices first.
+        Shapes of the whole, starting with the mesh's own vertices.
     faces, edges : (m, 3), (e, 2)
-        Triangles of the whole, and its edges that belong to none.
+        Triangles of the whole, and its edges without a triangle.
     """
 
     def __init__(self, obj: bpy.types.Object, shapes: Sequence[Floats]) -> None:
@@ -48,7 +48,7 @@ class MirroredShapes:
         self.shapes, self.faces, self.edges = whole.shapes, whole.faces, whole.edges
 
     def own(self, shape: Floats) -> Floats:
-        """(n, 3) the mesh's own part of a shape (w, 3) of the whole, its seam on the planes."""
+        """(n, 3) the mesh's own part of a shape (w, 3) of the whole, with its seam on the planes."""
         half = shape[: self._count]
         for plane, on_plane in self._seams:
             half = plane.raised(half, np.where(on_plane, -plane.heights(half), 0.0))

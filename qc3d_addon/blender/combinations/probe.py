@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an object shows where some of its keys have certain values: in-betweens, drivers and all, asked of a copy."""
+"""Evaluates an object at given values of some keys, including in-betweens and drivers, on a temporary copy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..chains.absolute_copy import copied
 from ..keys.control import key_path, value_path
 from ..kinds import keys_of, mesh_of, present
 
-# Two evaluations in a row that agree are right: Blender's threads seldom evaluate a driver before what it reads.
+# Two evaluations in a row that agree are right: see the values for glTF.
 _MOST_EVALUATIONS = 10
 # What stands between the names of keys in the name of a shape for all of them.
 _MARKS = ("_", "+", "-", " + ", "__", ".", " ", "_x_")
@@ -27,11 +27,11 @@ _MARKS = ("_", "+", "-", " + ", "__", ".", " ", "_x_")
 def probed(
     obj: bpy.types.Object, names: Sequence[str], left_out: Collection[str]
 ) -> Iterator[Callable[[Sequence[float]], Floats]]:
-    """A function that gives the positions (n, 3) at values of the keys ``names``, all others at rest.
+    """A function that returns the positions (n, 3) at values of the keys ``names``, with all others at 0.
 
-    Keys that are driven by these keys follow them; those ``left_out`` show nothing. A key that is named after all of
-    these, such as ``A_B``, and not driven by them, is what bones or properties put on together with them: it is as far
-    on as the product of their values. The object stays as it is.
+    Keys that are driven by these keys follow them; those ``left_out`` stay at 0. A key that is named after all of them,
+    such as ``A_B``, but not driven by them, is taken for a combination key that bones or properties drive: its value is
+    the product of theirs. The object stays as it is.
     """
     with ExitStack() as undo:
         copy = copied(obj, undo)
@@ -62,7 +62,7 @@ def probed(
 
 
 def _quiet(keys: bpy.types.Key, names: Sequence[str], left_out: Collection[str]) -> None:
-    """Let nothing move a copy's keys but the values of some of them."""
+    """Remove everything that moves a copy's keys, except drivers that read the values of some of them."""
     animation = keys.animation_data
     if animation is not None:
         animation.action = None
@@ -84,7 +84,7 @@ def _quiet(keys: bpy.types.Key, names: Sequence[str], left_out: Collection[str])
 
 
 def _named_after(keys: bpy.types.Key, names: Sequence[str]) -> list[bpy.types.ShapeKey]:
-    """Keys that no driver moves and that are named after all of ``names``, as riggers do."""
+    """Keys without a driver that are named after all of ``names``, as riggers name combinations."""
     wanted = {mark.join(order) for order in permutations(names) for mark in _MARKS}
     drivers = [] if keys.animation_data is None else [curve.data_path for curve in keys.animation_data.drivers]
     return [key for key in keys.key_blocks if key.name in wanted and value_path(key.name) not in drivers]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which pairs of an object's keys need a combination; kept for the panel as long as Blender runs."""
+"""Finds the pairs of an object's keys that need a combination; kept for the panel while Blender runs."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ from ..store.mesh_data import key_coordinates, shown_coordinates, triangles, wir
 
 @dataclass(frozen=True)
 class PairVerdict:
-    """Whether two keys may be added.
+    """Whether two keys simply add up.
 
     Parameters
     ----------
     outer, inner : str
         Names of the keys; the outer one carries the other along.
     adding_is_right : bool
+        Whether their sum is right.
     distance : float
-        About how far the sum is off, over the size.
+        Estimated error of the sum, over the size.
     text : str
         The verdict in words.
     """
@@ -43,14 +44,14 @@ _found: dict[int, list[PairVerdict]] = {}
 
 
 def judge(obj: bpy.types.Object | None) -> Iterator[float]:
-    """Judge every two of the object's keys that are relative to the same one; yields the part that is done.
+    """Judge every pair of the object's keys with the same base; yields the fraction that is done.
 
-    What was made for keys is left out. ``found`` has the verdicts afterwards.
+    Generated keys are skipped. ``found`` returns the verdicts afterward.
 
     Raises
     ------
     InputError
-        If the object has no two such keys, or they cannot be used.
+        If the object has no two such keys, or keys cannot be used.
     """
     from ...solver.combinations.base import KeysOnBase
     from ...solver.combinations.verdicts import verdicts
@@ -82,7 +83,7 @@ def judge(obj: bpy.types.Object | None) -> Iterator[float]:
 
 
 def found(obj: bpy.types.Object) -> list[PairVerdict]:
-    """The verdicts of the object's keys, those that need a combination first; empty before they were judged."""
+    """The verdicts on the object's pairs of keys, those that need a combination first; empty before ``judge``."""
     keys = keys_of(obj)
     blocks = keys.key_blocks
     return [one for one in _found.get(keys.session_uid, []) if one.outer in blocks and one.inner in blocks]

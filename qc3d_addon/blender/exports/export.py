@@ -34,7 +34,7 @@ SUFFIXES = (".usda", ".usdc", ".usd", ".fbx", ".glb")
 def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> list[str]:
     """Write an object with its shape keys and their in-betweens, and the animation over the scene's frames.
 
-    The object and the scene are unchanged afterwards, whatever happens. The parents of the object and the armatures
+    The object and the scene are unchanged afterward, whatever happens. The parents of the object and the armatures
     that deform it are exported too.
 
     Parameters
@@ -165,8 +165,8 @@ def _values_over_time(obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArr
 def _settled_values(obj: bpy.types.Object) -> NDArray[np.float64]:
     """(k,) the present values of the object's shape keys.
 
-    Blender's threads occasionally evaluate a driver before the driver that it depends on, about once in a thousand
-    times on a busy machine. Therefore the values are evaluated until two evaluations agree.
+    Where drivers of the user move other things of the keys than their values, Blender's threads may write values of the
+    frame before back, one time in a thousand on a machine with much to do: two evaluations that agree are right.
     """
     found = _values(obj)
     for _ in range(_MOST_EVALUATIONS):

@@ -24,7 +24,7 @@ from .control import Control, key_path, mute_path, value_path
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
 
-VARIABLE = "slider"
+VARIABLE, MUTED = "slider", "muted"
 # Blender merges points of a curve that are nearer than 0.01 to each other.
 _LEAST_STEP = 0.02
 # In knots. A cardinal spline decays by a factor of 0.27 per knot, so beyond 16 knots it is 0 in single precision.
@@ -41,6 +41,9 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     knots, values, slopes = _function(weights, step)
     stretch = _stretch(weights.knots)
     read(present(curve.driver), control, stretch)
+    if control.is_key:
+        _mute_with(present(curve.driver), control, stretch)
+        _free_mute(key, control)
     knots, slopes = knots * stretch, slopes / stretch
     width = np.diff(knots) / 3.0
     before, after = np.append(width[0], width), np.append(width, width[-1])
@@ -50,13 +53,29 @@ def drive_value(key: bpy.types.ShapeKey, control: Control, weights: Weights, ste
     curve.extrapolation = 'LINEAR'
 
 
-def drive_mute(key: bpy.types.ShapeKey, control: Control) -> None:
-    """Drive a key's mute flag by that of the key that plays it."""
+def _mute_with(driver: bpy.types.Driver, control: Control, stretch: int) -> None:
+    """Let a driver read 0, where weights are 0, while the key that it reads is muted.
+
+    A driver of the key's own ``mute`` would be simpler, but makes Blender 4.5 and 5.2 write the values of all driven
+    keys back, to unshare what they are in, while other threads give them new ones: now and then an in-between shows the
+    frame before.
+    """
+    variable = driver.variables.new()
+    variable.name, variable.type = MUTED, 'SINGLE_PROP'
+    target = variable.targets[0]
+    target.id_type, target.id, target.data_path = control.id_type, control.owner, mute_path(control.name)
+    driver.type = 'SCRIPTED'
+    times = "" if stretch == 1 else f" * {stretch}"
+    driver.expression = f"{VARIABLE}{times} * (1 - {MUTED})"  # simple enough to run without permission, too
+
+
+def _free_mute(key: bpy.types.ShapeKey, control: Control) -> None:
+    """Remove the driver by which an earlier bake muted a key."""
     keys, path = expect(bpy.types.Key, key.id_data), mute_path(key.name)
     curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
-    if curve is None:
-        curve = compat.new_driver(keys, path)
-    _read_path(present(curve.driver), control, mute_path(control.name))
+    if curve is not None and _reads_alone(curve.driver, mute_path(control.name)):
+        keys.driver_remove(path)
+        key.mute = False
 
 
 def drive_position(curve: bpy.types.FCurve, control: Control, places: ArrayLike, values: ArrayLike) -> None:
@@ -198,12 +217,12 @@ def _set_curve(
 
 
 def _reads_alone(driver: bpy.types.Driver | None, path: str) -> bool:
+    """Whether a driver reads the control of a path and, beside it, at most whether it is muted."""
     if driver is None:
         return False
     variables = driver.variables
     return (
-        len(variables) == 1
-        and variables[0].name == VARIABLE
+        [variable.name for variable in variables] in ([VARIABLE], [VARIABLE, MUTED])
         and variables[0].type == 'SINGLE_PROP'
         and variables[0].targets[0].data_path == path
     )

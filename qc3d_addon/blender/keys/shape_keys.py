@@ -147,8 +147,6 @@ def chain_written(
             written[step] = new_key(obj, names.key_name(chain.slider, step, steps.places), base, undo)
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
-            if control.is_key:
-                drivers.drive_mute(written[step], control)
         if keyframes is not None:
             curve, notes = slider.begin_keyframes(control, chain, keyframes, undo)
         chain.keys = {step: written[step].name for step in sorted(written)}
@@ -168,8 +166,6 @@ def _let_play(kept: dict[int, bpy.types.ShapeKey], control: Control, weights: We
         if (key.slider_min, key.slider_max) == (0.0, 1.0):  # otherwise the user chose the range
             _widen(key)
         drivers.drive_value(key, control, weights, step)
-        if control.is_key:
-            drivers.drive_mute(key, control)
 
 
 def _kept(

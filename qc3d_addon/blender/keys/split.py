@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A key of both sides of a face split into one for each side, which add up to it."""
+"""Splits a key for both sides of a face into one for each side, which add up to it."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..store.mesh_data import key_coordinates, set_key_coordinates
 
 
 def split_key(obj: bpy.types.Object, name: str, falloff: float) -> tuple[str, str]:
-    """Add the keys of the left and of the right side of a key; their names.
+    """Add the keys for the left and the right side of a key; returns their names.
 
-    The left side is where x is positive, as Blender names sides. Across the middle, where x is nearer to 0 than the
-    falloff, the one fades out as the other fades in, so that both together are the key.
+    The left side has positive x, as Blender names sides. Where the absolute value of x is below the falloff, one side
+    fades into the other, so that both add up to the key.
 
     Parameters
     ----------
     name
-        Of a key that has no side in its name.
+        Name of the key, which must not end in a side such as ".L".
     falloff
-        In the object's own units, 0 or more.
+        Half the width of the transition, in the object's own units; 0 or more.
 
     Raises
     ------

@@ -71,7 +71,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
 
 
 class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
-    """Bake the selected objects that have these shape keys as one: lashes stay on lids, clothes on skin"""
+    """Bake the selected objects that have these shape keys together, so that lashes stay on lids and clothes on skin"""
 
     bl_idname = "qc3d.bake_objects"
     bl_label = "Bake Selected Objects Together"
@@ -81,8 +81,8 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
     else:
         one_control: BoolProperty(
             name="One Control",
-            description="What plays the in-betweens of the active object drives those of the others, "
-            "where nothing else drives them",
+            description="Let the key or slider of the active object drive those of the others, "
+            "unless something else drives them",
             default=True,
             options={'SKIP_SAVE'},
         )
@@ -108,5 +108,5 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
         notes = list(dict.fromkeys(note for result in results for note in result.notes))
         if self._left_out:
             names = ", ".join(f"'{name}'" for name in self._left_out)
-            notes.append(f"Left out, since not all of these keys are there, or their mesh is baked already: {names}.")
+            notes.append(f"Left out, because keys are missing or the same mesh was already baked: {names}.")
         return [*notes, f"{len(results)} objects baked together. {results[0].summary()}"]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators for keys that are on at once."""
+"""The operators for combinations of keys."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -19,14 +19,14 @@ from .common import OperatorMixin, Status, poll_active_object
 
 
 class CombinationWork(OperatorMixin):
-    """Does something with keys that are on at once, step by step; an operator says what by ``work``."""
+    """Works on combinations of keys step by step; an operator defines ``work``."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_active_object(cls, context)
 
     def work(self, context: bpy.types.Context) -> Iterator[object]:
-        """The parts that are done, at last a sentence for the user; raises QC3DError where nothing was changed."""
+        """Yield the fraction that is done and, last, a sentence for the user; raises QC3DError if it fails."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Status:
@@ -54,7 +54,7 @@ class CombinationWork(OperatorMixin):
 
 
 class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
-    """Make keys that correct two keys, or three, where these are on at once; they themselves stay as they are"""
+    """Add keys that correct two or three keys while they are on at once; these keys themselves stay as they are"""
 
     bl_idname = "qc3d.combine_keys"
     bl_label = "Combine Keys"
@@ -68,10 +68,10 @@ class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
     else:
         first: StringProperty(name="Key", description="One of the keys", options={'SKIP_SAVE'})
         second: StringProperty(name="And", description="Another one", options={'SKIP_SAVE'})
-        third: StringProperty(name="And", description="A third one; none where left empty", options={'SKIP_SAVE'})
+        third: StringProperty(name="And", description="Optional third key", options={'SKIP_SAVE'})
         find_order: BoolProperty(
             name="Find the Outer Key",
-            description="Find out which key carries the others along; else the first does, and the second the third",
+            description="Find out which key carries the others along; otherwise each key carries the following ones",
             default=True,
             options={'SKIP_SAVE'},
         )
@@ -95,7 +95,7 @@ class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
 
 
 class QC3D_OT_judge_pairs(CombinationWork, bpy.types.Operator):
-    """Find out which pairs of this object's keys are right when they are added, and which need a combination"""
+    """Find out which pairs of this object's keys simply add up, and which need a combination"""
 
     bl_idname = "qc3d.judge_pairs"
     bl_label = "Judge All Pairs"
@@ -109,7 +109,7 @@ class QC3D_OT_judge_pairs(CombinationWork, bpy.types.Operator):
 
 
 class QC3D_OT_remove_combination(CombinationWork, bpy.types.Operator):
-    """Remove the keys that correct these; they themselves stay as they are"""
+    """Remove the correction keys of this combination; the combined keys themselves stay as they are"""
 
     bl_idname = "qc3d.remove_combination"
     bl_label = "Remove Combination"
@@ -119,14 +119,14 @@ class QC3D_OT_remove_combination(CombinationWork, bpy.types.Operator):
         label: str
     else:
         label: StringProperty(
-            name="Keys", description="The keys, joined by +, as the panel has them", options={'SKIP_SAVE'}
+            name="Keys", description="Names of the keys, joined by +, as in the panel", options={'SKIP_SAVE'}
         )
 
     def work(self, context: bpy.types.Context) -> Iterator[object]:
         obj = checks.require_object(context.active_object)
         chosen = next((one for one in combined_keys.read(keys_of(obj)) if one.label == self.label), None)
         if chosen is None:
-            raise InputError(f"There is no combination of '{self.label}'; choose one that the panel lists.")
+            raise InputError(f"There is no combination '{self.label}'; choose one from the panel.")
         for note in combine.remove(obj, chosen):
             self.report({'WARNING'}, note)
-        yield f"What was made for {chosen.label} was removed."
+        yield f"The combination of {chosen.label} was removed."

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that splits a key into its left and its right side."""
+"""The operator that splits a key into a left and a right one."""
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
@@ -16,7 +16,7 @@ from .common import Status, poll_active_object
 
 
 class QC3D_OT_split_key(bpy.types.Operator):
-    """Add a key for the left and one for the right side of this key, which together are the key"""
+    """Add a key for the left side of this key and one for the right side; added up, they are this key"""
 
     bl_idname = "qc3d.split_key"
     bl_label = "Split Key Left and Right"
@@ -27,11 +27,11 @@ class QC3D_OT_split_key(bpy.types.Operator):
         falloff: float
     else:
         key: StringProperty(
-            name="Key", description="The key to split; the active one where left out", options={'SKIP_SAVE'}
+            name="Key", description="The key to split; by default the active one", options={'SKIP_SAVE'}
         )
         falloff: FloatProperty(
             name="Falloff",
-            description="How far from the middle, along x, one side fades into the other",
+            description="Distance from the middle, along x, over which one side fades into the other",
             default=0.1,
             min=0.0,
             subtype='DISTANCE',

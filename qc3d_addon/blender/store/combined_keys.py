@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which shape keys correct others that are on at once: remembered with the shape keys, never guessed from names."""
+"""The record of combinations of shape keys, stored with the keys and never guessed from names."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _MOST_KEYS = 4
 
 @dataclass(frozen=True)
 class Combined:
-    """What was made for some keys.
+    """A combination of keys.
 
     Parameters
     ----------
     keys : tuple of str
         Names of the keys, the outermost first.
     made : tuple of (str, tuple of float)
-        Names of the keys that correct them, each with the values of the keys at which it is fully on.
+        Names of the correction keys, each with the values of the combined keys at which it is fully on.
     """
 
     keys: tuple[str, ...]
@@ -48,17 +48,17 @@ class Combined:
 
     @property
     def label(self) -> str:
-        """The keys in words."""
+        """Name of the combination for the user."""
         return " + ".join(self.keys)
 
 
 def read(keys: bpy.types.Key) -> list[Combined]:
-    """What was made for keys that are on at once, as far as it is still there.
+    """The combinations whose keys still exist.
 
     Raises
     ------
     InputError
-        If what is remembered is damaged.
+        If the record is damaged.
     """
     text = keys.get(PROPERTY)
     if text is None:
@@ -67,7 +67,7 @@ def read(keys: bpy.types.Key) -> list[Combined]:
         every = [Combined.from_json(entry) for entry in stored.plain_list(stored.parse(text)["combinations"])]
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(
-            f"What is remembered of combinations on '{keys.name}' is damaged; delete the custom property '{PROPERTY}' "
+            f"The record of combinations on '{keys.name}' is damaged; delete the custom property '{PROPERTY}' "
             "of the shape keys, whose keys then are yours."
         ) from error
     there = [Combined(one.keys, tuple(made for made in one.made if is_driven(keys, made[0]))) for one in every]
@@ -75,7 +75,7 @@ def read(keys: bpy.types.Key) -> list[Combined]:
 
 
 def write(keys: bpy.types.Key, combinations: list[Combined], undo: ExitStack) -> None:
-    """Remember them in place of what was; closing ``undo`` takes it back."""
+    """Replace the record; closing ``undo`` restores the previous one."""
     if combinations:
         text = json.dumps({"version": 1, "combinations": [asdict(one) for one in combinations]}, allow_nan=False)
         id_properties.put(keys, PROPERTY, text, undo)
@@ -84,12 +84,12 @@ def write(keys: bpy.types.Key, combinations: list[Combined], undo: ExitStack) ->
 
 
 def names_made(keys: bpy.types.Key) -> set[str]:
-    """Names of all keys that correct others."""
+    """Names of all correction keys."""
     return {name for one in read(keys) for name, _ in one.made}
 
 
 def is_driven(keys: bpy.types.Key, name: str) -> bool:
-    """Whether there is a key of that name whose value a driver gives."""
+    """Whether there is a key of that name with a driven value."""
     if name not in keys.key_blocks or keys.animation_data is None:
         return False
     path = f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'

@@ -62,7 +62,8 @@ def _read(keys: bpy.types.Key, made: Iterable[str]) -> str | None:
     for name in made:
         curve = keys.animation_data.drivers.find(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
         variables = [] if curve is None or curve.driver is None else list(curve.driver.variables)
-        if len(variables) != 1 or variables[0].type != 'SINGLE_PROP':
+        # Beside the value, at most whether the key is muted.
+        if len(variables) not in (1, 2) or variables[0].type != 'SINGLE_PROP':
             continue
         match = _VALUE.fullmatch(variables[0].targets[0].data_path)
         read = None if match is None else bpy.utils.unescape_identifier(match[1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sub-panel for keys that are on at once."""
+"""The sub-panel for combinations of keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_ROWS = 12
 
 
 class QC3D_PT_combinations(bpy.types.Panel):
-    """Which pairs need a combination, and what was made."""
+    """The combinations that were made, and the pairs that need one."""
 
     bl_label = "Keys at Once"
     bl_space_type = 'VIEW_3D'
@@ -69,6 +69,6 @@ def _draw_verdicts(
         button.first, button.second = one.outer, one.inner
     left = len(needing) - _MOST_ROWS
     if left > 0:
-        layout.label(text=f"and {left} more that need one")
+        layout.label(text=f"{left} more need a combination")
     right = sum(one.adding_is_right for one in found)
     draw_sentence(context, layout, f"Adding is right for {right} of {len(found)} pairs.", 'CHECKMARK')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mappings in few numbers: the lowest modes of their representation, quantised (Chen & Lui, section 7).
+"""Mappings in few numbers: the lowest modes of their representation, quantized (Chen & Lui, section 6.2).
 
 Three schemes share the file format:
 

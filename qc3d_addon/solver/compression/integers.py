@@ -23,7 +23,7 @@ _ORDERS = 3
 def packed(rows: NDArray[np.int64], predictor: Predictor | None = None) -> bytes:
     """Rows (F, n, c) as bytes: differences along the row, of whichever order makes them smallest.
 
-    Where the n numbers belong to points a predictor takes away what neighbours tell.
+    Where the n numbers belong to points a predictor takes away what neighbors tell.
     """
     choices = [_differences(rows, order) for order in range(max(min(_ORDERS, len(rows)), 1))]
     order, left = min(enumerate(choices), key=lambda choice: float(np.log2(1 + np.abs(choice[1])).sum()))

@@ -3,7 +3,7 @@
 """Smooth functions on a tetrahedral mesh, the lowest frequencies first, and values carried between tets and vertices.
 
 The eigenfunctions of the Laplacian, L phi = lambda M phi, with the stiffness matrix L of linear elements. M holds the
-lumped vertex volumes (Chen & Lui, section 7), or the same weight for every vertex: since the mesh is finest where the
+lumped vertex volumes (Chen & Lui, section 6.2), or the same weight for every vertex: since the mesh is finest where the
 shape is, low modes of the second kind have their detail there.
 """
 
@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 
@@ -32,6 +33,7 @@ _SEED = 20230805
 # Matrices of so few vertices are factored: that takes a second or two. It also is for so many modes that multigrid's
 # second mesh, which has about a thirtieth of the vertices, does not have them.
 _FEW, _PER_MODE = 10_000, 100
+_DENSE, _DENSE_MATRICES = 4, 3  # more than a quarter of all modes come from a dense matrix; it is held so many times
 _TOLERANCE = 1e-8  # of the residuals, over the largest eigenvalue asked for
 
 Weights = Literal["volume", "equal"]
@@ -106,11 +108,12 @@ def spectrum(mesh: TetMesh, count: int, weights: Weights = "volume") -> Spectrum
         If the mesh has too few vertices for so many modes, or needs more memory for them than there is.
     """
     used = np.unique(mesh.tets)
-    most = len(used) - 2
-    if not 1 <= count <= most:
-        raise InputError(f"{count} modes are not possible on {len(used)} vertices; choose 1 to {most}.")
+    if not 1 <= count <= len(used):
+        raise InputError(f"{count} modes are not possible on {len(used)} vertices; choose 1 to {len(used)}.")
+    is_dense = _DENSE * count > len(used)
     is_factored = len(used) <= _FEW or count * _PER_MODE > len(used)
-    require_memory_for_modes(len(used), count, 0 if is_factored else min(BLOCK, count + GUARDS))
+    block = 0 if is_factored else min(BLOCK, count + GUARDS)
+    require_memory_for_modes(len(used), _DENSE_MATRICES * len(used) if is_dense else count, block)
     gradient = gradient_operator(mesh.tets, mesh.gradients, len(mesh.points))
     stiffness = csr_array(gradient.T @ (diags_array(np.tile(mesh.volumes, 3)) @ gradient))
     del gradient
@@ -123,7 +126,12 @@ def spectrum(mesh: TetMesh, count: int, weights: Weights = "volume") -> Spectrum
     matrix = csr_array(diags_array(scale) @ stiffness[used][:, used] @ diags_array(scale))
     start = np.random.default_rng(_SEED).normal(size=len(used))
     shift = _SHIFT / size**2
-    values, vectors = _factored(matrix, count, shift, start) if is_factored else _iterated(matrix, count, shift, scale)
+    if is_dense:
+        values, vectors = eigh(matrix.toarray(), subset_by_index=(0, count - 1), overwrite_a=True)
+    elif is_factored:
+        values, vectors = _factored(matrix, count, shift, start)
+    else:
+        values, vectors = _iterated(matrix, count, shift, scale)
     # A mode and its opposite are equally right: the same one is taken whatever the solver returns.
     signs = np.where(start @ vectors < 0.0, -1.0, 1.0)
     modes = np.zeros((len(mesh.points), count))

@@ -24,6 +24,7 @@ _FIXED = struct.Struct("<8sHI")  # magic, version, bytes of the header
 _MAGIC, _VERSION = b"QC3DMAPS", 1
 _MOST_HEADER = 2**20
 _OPTIONS = ("stretch", "extra_turns", "engine", "quality", "seed")
+_LATER_OPTIONS = ("sampling", "threshold", "sparsity")  # which earlier versions did not write
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ def write_maps(path: Path, kept: KeptMaps) -> None:
     ends = list(dict.fromkeys(pairwise(kept.through)))
     header = {
         "through": kept.through,
-        "settings": {name: getattr(kept.options, name) for name in _OPTIONS},
+        "settings": {name: getattr(kept.options, name) for name in _OPTIONS + _LATER_OPTIONS},
         "sizes": [len(kept.maps[pair]) for pair in ends],
     }
     text = json.dumps(header).encode()
@@ -96,7 +97,8 @@ def _header(text: bytes, path: Path) -> tuple[tuple[str, ...], FitOptions, list[
     try:
         header: dict[str, Any] = json.loads(text)
         through, sizes, chosen = header["through"], header["sizes"], header["settings"]
-        options = FitOptions(**{name: chosen[name] for name in _OPTIONS})
+        known = [*_OPTIONS, *(name for name in _LATER_OPTIONS if name in chosen)]
+        options = FitOptions(**{name: chosen[name] for name in known})
     except (ValueError, KeyError, TypeError, RecursionError, InputError) as error:
         raise InputError(f"{path} is damaged: its header cannot be read; save the map again.") from error
     sound = (

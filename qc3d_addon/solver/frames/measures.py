@@ -145,24 +145,44 @@ class _LandmarkAverages:
         return np.asarray((self._landmarks @ (self._around @ matrices.reshape(-1, 9))).reshape(-1, 3, 3))
 
 
+class EdgeExcess:
+    """How far edges leave the interval between their lengths in the two keys of a pair.
+
+    Parameters
+    ----------
+    pair : KeyPair
+
+    Attributes
+    ----------
+    edges : (k, 2) int64
+        The edges that are measured: those that no key makes a point.
+    """
+
+    def __init__(self, pair: KeyPair) -> None:
+        # Squares of what is very large or very small are no numbers.
+        self._unit = max(pair.diagonal, float(np.ptp(pair.key1, axis=0).max()))
+        self.edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
+        ends = self._lengths(pair.key0), self._lengths(pair.key1)
+        shortest, longest = np.minimum(*ends), np.maximum(*ends)
+        usable = shortest > _SHORTEST * (pair.diagonal / self._unit)
+        self.edges, self._shortest, self._longest = self.edges[usable], shortest[usable], longest[usable]
+
+    def of(self, frame: Floats) -> Floats:
+        """(k,) for a frame (n, 3): 0.05 is 5 % longer or shorter than in both keys; negative between them."""
+        length = self._lengths(frame)
+        return np.asarray(np.maximum(length / self._longest - 1.0, 1.0 - length / self._shortest))
+
+    def _lengths(self, shape: Floats) -> Floats:
+        return np.asarray(np.linalg.norm((shape[self.edges[:, 0]] - shape[self.edges[:, 1]]) / self._unit, axis=1))
+
+
 def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:
     """The edge that leaves the interval between its lengths in the two keys farthest, among frames (k, n, 3)."""
-    edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
-    # Squares of what is very large or very small are no numbers.
-    unit = max(pair.diagonal, float(np.ptp(pair.key1, axis=0).max()))
-
-    def lengths(shape: Floats, edges: Ints) -> Floats:
-        return np.asarray(np.linalg.norm((shape[edges[:, 0]] - shape[edges[:, 1]]) / unit, axis=1))
-
-    ends = lengths(pair.key0, edges), lengths(pair.key1, edges)
-    shortest, longest = np.minimum(*ends), np.maximum(*ends)
-    usable = shortest > _SHORTEST * (pair.diagonal / unit)
-    edges, shortest, longest = edges[usable], shortest[usable], longest[usable]
+    measure = EdgeExcess(pair)
     worst = WorstStretch(0.0, 0, 0)
     for number, frame in enumerate(frames):
-        length = lengths(frame, edges)
-        excess = np.maximum(length / longest - 1.0, 1.0 - length / shortest)
+        excess = measure.of(frame)
         edge = int(np.argmax(excess)) if len(excess) else 0
         if len(excess) and excess[edge] > worst.excess:
-            worst = WorstStretch(float(excess[edge]), number, int(edges[edge, 0]))
+            worst = WorstStretch(float(excess[edge]), number, int(measure.edges[edge, 0]))
     return worst

@@ -81,7 +81,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = F
             if options.engine == "tetwild":
                 raise
             notes.append(f"The cube was filled by the engine delaunay. {error}")
-    mesh = delaunay_mesh(points, faces, resolution, options.seed)
+    mesh = delaunay_mesh(points, faces, resolution, options)
     require_filled_cube(mesh)
     return FilledCube(mesh, "delaunay", tuple(notes))
 

@@ -4,7 +4,8 @@
 
 Serves the purpose of the sampling in Chen & Lui (arXiv 2308.05333, section 6.1), but differs from it: there, samples of
 one uniform Poisson disk are discarded at random, with a probability that depends on their distance from the surface;
-here, the radius of the disk itself grows linearly with that distance, and nothing is discarded at random.
+here, the radius of the disk itself grows linearly with that distance, and nothing is discarded at random. Module
+``published_samples`` has the paper's own.
 """
 
 from __future__ import annotations

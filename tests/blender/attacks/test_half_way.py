@@ -115,7 +115,7 @@ def request(to_key: str = "Lean", count: int = 2, **choices: Any) -> BakeRequest
 
 @pytest.fixture
 def even() -> bpy.types.Object:
-    """The active object: a symmetric sphere with the shape keys Basis, Lean and Stretch, and a colour of its own."""
+    """The active object: a symmetric sphere with the shape keys Basis, Lean and Stretch, and a color of its own."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6)
     obj = bpy.context.active_object
     obj.name = obj.data.name = "Even"

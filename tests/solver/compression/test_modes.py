@@ -42,10 +42,19 @@ def test_the_same_every_time() -> None:
     np.testing.assert_allclose(spectrum(mesh, 30).modes[:, :10], first.modes[:, :10], atol=1e-8)
 
 
-@pytest.mark.parametrize("count", [0, 124, 1000])
+@pytest.mark.parametrize("count", [0, 126, 1000])
 def test_too_many_modes(count: int) -> None:
-    with pytest.raises(InputError, match=f"{count} modes are not possible on 125 vertices; choose 1 to 123"):
+    with pytest.raises(InputError, match=f"{count} modes are not possible on 125 vertices; choose 1 to 125"):
         spectrum(jittered_grid(4, seed=0), count)
+
+
+def test_all_modes_are_a_basis() -> None:
+    mesh = jittered_grid(4, seed=3)
+    found, few = spectrum(mesh, 125), spectrum(mesh, 20)
+    np.testing.assert_allclose(found.modes[:, :20], few.modes, atol=1e-8)
+    values = np.random.default_rng(0).normal(size=125)
+    coefficients = found.modes.T @ (Transfer(mesh).vertex_volumes * values)
+    np.testing.assert_allclose(found.modes @ coefficients, values, atol=1e-10)
 
 
 def test_transfers_keep_constants_and_integrals() -> None:

@@ -10,6 +10,7 @@ import pytest
 from qc3d_addon.solver.meshing.delaunay import delaunay_mesh
 from qc3d_addon.solver.meshing.poisson_disk import RESOLUTIONS, Resolution
 from qc3d_addon.solver.meshing.slivers import WANTED_ANGLE, sliver_free, smallest_dihedral_angles, triangulate
+from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import TetMesh
 
 from ..meshes import icosphere, kuhn_grid
@@ -18,19 +19,20 @@ NORMAL = RESOLUTIONS["normal"]
 
 
 def test_the_same_input_and_seed_give_the_same_mesh() -> None:
-    first, second = (delaunay_mesh(*icosphere(2, 0.15), NORMAL, seed=7) for _ in range(2))
+    first, second = (delaunay_mesh(*icosphere(2, 0.15), NORMAL, FitOptions(seed=7)) for _ in range(2))
     assert np.array_equal(first.points, second.points)
     assert np.array_equal(first.tets, second.tets)
 
 
 def test_another_seed_gives_another_mesh() -> None:
-    first, second = (delaunay_mesh(*icosphere(2, 0.15), NORMAL, seed=seed) for seed in (0, 1))
+    first, second = (delaunay_mesh(*icosphere(2, 0.15), NORMAL, FitOptions(seed=seed)) for seed in (0, 1))
     assert first.points.shape != second.points.shape or not np.array_equal(first.points, second.points)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_no_sliver_is_left(seed: int) -> None:
-    assert smallest_dihedral_angles(delaunay_mesh(*icosphere(2, 0.15), NORMAL, seed)).min() >= WANTED_ANGLE
+    mesh = delaunay_mesh(*icosphere(2, 0.15), NORMAL, FitOptions(seed=seed))
+    assert smallest_dihedral_angles(mesh).min() >= WANTED_ANGLE
 
 
 def test_slivers_of_a_regular_grid_are_removed() -> None:

@@ -27,7 +27,7 @@ from .store.names import MAX_STEPS
 _DESCRIPTIONS = {
     "mode": {
         "natural": "Limbs turn; lengths and volumes are kept",
-        "linear": "The published scheme, for comparison: rotation and stretch of the volume are interpolated linearly",
+        "linear": "The published scheme, for comparison: only the stretch of the volume is interpolated",
         "straight": "Vertices move on straight lines: for keys that are mirrored or turned inside out",
     },
     "stretch": {

@@ -12,6 +12,7 @@ from ..worker import engines
 from . import choices, cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
+from .keys import straight
 from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
@@ -32,6 +33,7 @@ from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.prepare import QC3D_OT_prepare
 from .operators.split_key import QC3D_OT_split_key
+from .operators.straight import QC3D_OT_straight
 from .ui import bake_list, menus, panel_combinations, panel_exports, panel_results, panels, presets
 
 CLASSES = (
@@ -49,6 +51,7 @@ CLASSES = (
     QC3D_OT_heat_map,
     QC3D_OT_select_worst,
     QC3D_OT_live_scrub,
+    QC3D_OT_straight,
     QC3D_OT_remove,
     QC3D_OT_play_on_key,
     QC3D_OT_to_keyframes,
@@ -88,6 +91,7 @@ def register() -> None:
     menus.register()
     legend.register()
     live_scrub.register()
+    straight.register()
     _commands.extend(compat.register_command("qc3d", cli.run_command))
 
 
@@ -95,6 +99,7 @@ def unregister() -> None:
     """Undo ``register`` in reverse order."""
     while _commands:
         compat.unregister_command(_commands.pop())
+    straight.unregister()
     live_scrub.unregister()
     legend.unregister()
     menus.unregister()

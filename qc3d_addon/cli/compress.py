@@ -103,8 +103,8 @@ def _decompress(arguments: argparse.Namespace) -> None:
         with replacing(arguments.output) as unfinished:
             write_arrays(unfinished, {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]})
         return
-    require_format(arguments.output)
     content = read_tets(arguments.mesh)
+    require_format(arguments.output)
     print_notes(content.notes)
     mesh = content.mesh()
     stored = read_compressed(arguments.file, Source("maps", mesh.points, mesh.tets))

@@ -61,8 +61,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def _run(arguments: argparse.Namespace) -> None:
     require_writable(arguments.output, inputs=[arguments.mesh, arguments.landmarks])
-    require_format(arguments.output)
     content = read_tets(arguments.mesh)
+    require_format(arguments.output)
     print_notes(content.notes)
     mesh = content.mesh()
     conditions = _conditions(arguments, content, mesh)

@@ -27,7 +27,7 @@ _MOST_TURNS = 100
 
 @dataclass(frozen=True)
 class FitOptions:
-    """What the fit of two keys depends on; a fit made with other options must be made anew.
+    """Options of the fit between two keys; a fit with other options has to be computed again.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class FitOptions:
         freely, each about its own axis. If still vertices hold a part, a value other than 0 also frees those of them
         that return to their place after full turns.
     sampling
-        What the ``delaunay`` engine triangulates: ``graded`` samples, or those of Chen & Lui (section 6.1),
-        ``published``: a uniform Poisson disk, of which samples are discarded at random.
+        Samples of the ``delaunay`` engine: ``graded``, or ``published``, those of Chen & Lui (section 6.1): a uniform
+        Poisson disk, of which samples are discarded at random.
     threshold
         Of the published sampling: within this many radii of the surface, fewer samples are kept the nearer they are.
     sparsity

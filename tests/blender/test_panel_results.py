@@ -45,6 +45,9 @@ class Layout:
         assert hasattr(bpy.types, kind)
         self.lists.append((len(getattr(data, collection)), rows["rows"]))
 
+    def context_pointer_set(self, name: str, data: object) -> None:
+        pass
+
     def separator(self) -> None:
         pass
 
@@ -109,6 +112,7 @@ def test_a_bake(even: bpy.types.Object) -> None:
     assert [name for name, _ in layout.buttons] == [
         "rebake",
         "live_scrub",
+        "straight",
         "select_worst",
         "heat_map",
         "mirror",

@@ -77,6 +77,7 @@ def test_one_control_plays_all_and_nothing_comes_apart(
     bake(play_on=play_on)
     chains = [Record.read(obj.data.shape_keys).chains for obj in (figure, hat)]
     assert [len(of_object) for of_object in chains] == [1, 1]
+    assert "Baked together with 'Figure'; Re-Bake bakes 'Hat' by itself." in chains[1][0].result.notes
     for place in (0.0, 0.1, 0.5, 0.8, 1.0):
         if play_on == "key":
             figure.data.shape_keys.key_blocks["Lean"].value = place

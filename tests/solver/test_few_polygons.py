@@ -36,7 +36,10 @@ def prism(corners: int) -> tuple[Floats, Ints, Ints]:
 
 
 def shapes_between(pair: KeyPair) -> list[Floats]:
-    return SurfacePath(Embedding.of(pair)).shapes([(time, None) for time in TIMES])
+    """Shapes between the keys in units of the cube, along the axes of the keys."""
+    embedding = Embedding.of(pair)
+    shapes = SurfacePath(embedding).shapes([(time, None) for time in TIMES])
+    return [embedding.scale * embedding.from_cube(shape, time) for shape, time in zip(shapes, TIMES, strict=True)]
 
 
 def out_of_plane(shape: Floats, loop: Ints) -> float:

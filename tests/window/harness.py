@@ -212,6 +212,12 @@ class Window:
         self.wait_for("region('UI').tag_redraw() or region('UI').active_panel_category == 'QC3D'")
         time.sleep(0.5)
 
+    def hover_sidebar(self) -> None:
+        """Put the mouse into the sidebar, where it shows nothing."""
+        left, bottom, width, _ = self.ask("r = region('UI'); [r.x, r.y, r.width, r.height]")
+        self.move(left + width // 2, self.size[1] - bottom - 6)
+        time.sleep(0.3)
+
     def find(self, button: str) -> tuple[int, int]:
         """Where in the sidebar the button is whose operator or property contains the text.
 

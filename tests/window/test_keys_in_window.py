@@ -94,6 +94,7 @@ def test_a_bone_drives_the_key_before_and_after(rigged: Window, tmp_path: Path) 
 def test_escape_stops_all_of_them(rigged: Window) -> None:
     before = rigged.ask("state()")
     begin(rigged)
+    rigged.hover_sidebar()
     rigged.press("Escape")
     rigged.wait_for("job() is None")
     rigged.wait_for("'Bake Keys was cancelled; nothing was changed.' in reports()")

@@ -11,6 +11,8 @@ import bpy
 from ..kinds import present
 from . import jobs
 
+CATEGORY = "QC3D"  # the tab of the panel
+
 
 def draw_bar(layout: bpy.types.UILayout, job: jobs.Job) -> None:
     """A progress bar with the name of the stage in it."""
@@ -22,6 +24,20 @@ def show(context: bpy.types.Context) -> None:
     if context.workspace is not None:
         context.workspace.status_text_set(_draw_status)
     _redraw_sidebars()
+
+
+def is_at(window: bpy.types.Window, x: int, y: int) -> bool:
+    """Whether a place, in pixels from the window's bottom left, is where progress is shown: status bar or sidebar."""
+    areas = window.screen.areas
+    if y < min(area.y for area in areas):  # the status bar is below all of them, and is none
+        return True
+    return any(
+        region.x <= x < region.x + region.width and region.y <= y < region.y + region.height
+        for area in areas
+        if area.type == 'VIEW_3D'
+        for region in area.regions
+        if region.type == 'UI' and getattr(region, "active_panel_category", CATEGORY) == CATEGORY
+    )
 
 
 def clear() -> None:
@@ -40,7 +56,7 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
         bar = layout.row()
         bar.ui_units_x = 12
         draw_bar(bar, job)
-        layout.label(text="  Cancel", icon='EVENT_ESC')
+        layout.label(text="  Cancel, with the mouse here", icon='EVENT_ESC')
     layout.separator_spacer()
     layout.template_reports_banner()
     layout.separator_spacer()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which keys are most likely meant where none are named. Quick enough for a panel."""
+"""Suggests keys if none are chosen. Fast enough for a panel."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..kinds import shape_keys_of
 from ..store import combined_keys
 from ..store.records import Chain, Record
 
-# As riggers and other programs name sculpted in-betweens: the key's name and a percentage, with or without a separator.
+# Riggers and other programs name sculpted in-betweens by the key's name and a percentage, perhaps with a separator.
 _PERCENTAGE = re.compile(r"[_. ]?(\d{1,2})")
-_ROUNDING = 0.01  # of places in whole percents, rounded or cut off
+_ROUNDING = 0.01  # tolerance for places in whole percents, rounded or truncated
 
 
 def suggested_keys(obj: bpy.types.Object, first: str, last: str) -> tuple[str, str]:
-    """The first and the last key to go between, where an empty name is replaced by the most likely one.
+    """The first and the last key, with empty names replaced by suggestions.
 
-    The last key is the active one, or the one whose in-between is active; the first one is what the last is relative
-    to. A name stays empty where none is likely.
+    The suggestion for the last key is the active key, or the key whose in-between is active; that for the first is the
+    base of the last. A name stays empty if there is no suggestion.
     """
     keys = shape_keys_of(obj) if obj.type == 'MESH' else None
     if keys is None or not keys.use_relative or (first and last):
@@ -38,9 +38,9 @@ def suggested_keys(obj: bpy.types.Object, first: str, last: str) -> tuple[str, s
 
 
 def sculpted_between(obj: bpy.types.Object, last: str) -> list[str]:
-    """The user's own keys that are named as in-betweens of a key, such as "Smile_25", "Smile_50" and "Smile_75".
+    """The user's own keys that are named like in-betweens of a key, such as "Smile_25", "Smile_50" and "Smile_75".
 
-    They are given in their order, and only where they stand evenly, as keys to go through do.
+    They are sorted by place, and returned only if the places are evenly spaced, like those of keys to go through.
     """
     keys = shape_keys_of(obj) if obj.type == 'MESH' else None
     if keys is None or not last:
@@ -71,7 +71,7 @@ def _active_key(obj: bpy.types.Object, keys: bpy.types.Key) -> str:
 
 
 def _made_keys(keys: bpy.types.Key) -> dict[str, Chain | None]:
-    """Names of the keys that were made, with the chain of those that are in-betweens."""
+    """Names of the generated keys, with the chain of those that are in-betweens."""
     try:
         made: dict[str, Chain | None] = dict.fromkeys(combined_keys.names_made(keys))
         for chain in Record.read(keys).chains:

@@ -108,7 +108,10 @@ def write_together(plan: JointPlan, outcome: Outcome, one_control: bool) -> list
     bakes = plan.together.apart(outcome.bake, plan.task.frame_options, plan.task.through)
     results = []
     for one, bake in zip(plan.plans, bakes, strict=True):
-        results.append(write_bake(one, OwnOutcome({}, bake)))
+        others = ", ".join(f"'{other.object_name}'" for other in plan.plans if other is not one)
+        said = f"Baked together with {others}; Re-Bake bakes '{one.object_name}' by itself." if others else ""
+        noted = replace(one, notes=(*one.notes, said)) if said else one
+        results.append(write_bake(noted, OwnOutcome({}, bake)))
     if one_control:
         leader, *followers = [_control(one) for one in plan.plans]
         for follower in followers:

@@ -84,15 +84,10 @@ def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: 
 def _largest_size(context: bpy.types.Context, copy: bpy.types.Object, frames: int) -> int:
     """Upper bound of the file's size in bytes. On a full disk Blender's exporter crashes Blender.
 
-    The exporter evaluates modifiers as for rendering, except a subdivision surface at the end; the modifiers of the
-    copy are set so that the viewport shows the same.
+    The exporter evaluates modifiers as for rendering; those of the copy are set so that the viewport shows the same.
     """
-    shown = [modifier for modifier in copy.modifiers if modifier.show_render]
-    last = shown[-1] if shown else None
-    if isinstance(last, bpy.types.SubsurfModifier) and last.subdivision_type == 'CATMULL_CLARK':
-        shown.pop()
     for modifier in copy.modifiers:
-        modifier.show_viewport = modifier in shown
+        modifier.show_viewport = modifier.show_render
         if isinstance(modifier, (bpy.types.SubsurfModifier, bpy.types.MultiresModifier)):
             modifier.levels = modifier.render_levels
     mesh = mesh_of(copy.evaluated_get(context.evaluated_depsgraph_get()))

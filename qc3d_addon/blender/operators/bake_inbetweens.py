@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
-from .. import live_scrub
 from ..bake.plan import Plan, plan_bake, request_again, write_bake
 from ..bake.together import objects_with_keys, plan_together, write_together
 from ..choices import BakeChoices
@@ -18,7 +17,7 @@ from ..kinds import present
 from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
-from .common import SLIDER, chosen_chain, poll_active_object, poll_chains, poll_panel_keys
+from .common import SLIDER, chosen_chain, end_previews, poll_active_object, poll_chains, poll_panel_keys
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -40,7 +39,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
         return plan_bake(obj, bake_request(self))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        live_scrub.end()
+        end_previews()
         result = write_bake(plan, outcome)
         show_newest(plan.locate())
         return [*result.notes, result.summary()]
@@ -64,7 +63,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         return plan_bake(obj, request_again(obj, chain))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        live_scrub.end()
+        end_previews()
         result = write_bake(plan, outcome)
         show_newest(plan.locate())
         return [*result.notes, result.summary()]
@@ -102,7 +101,7 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
         return replace(self._joint.plans[0], task=self._joint.task)
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        live_scrub.end()
+        end_previews()
         results = write_together(self._joint, outcome, self.one_control)
         show_newest(plan.locate())
         notes = list(dict.fromkeys(note for result in results for note in result.notes))

@@ -10,7 +10,6 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty
 
 from ...solver.errors import QC3DError
-from .. import live_scrub
 from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
 from ..bake.plan import Plan
 from ..choices import BakeChoices
@@ -18,7 +17,7 @@ from ..kinds import keys_of, present
 from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
-from .common import Status, poll_active_object
+from .common import Status, end_previews, poll_active_object
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -103,7 +102,7 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
         return self._next(context)
 
     def write_all(self, plan: Plan | None, outcome: Union["Outcome", QC3DError, None]) -> list[str]:
-        live_scrub.end()
+        end_previews()
         verdicts = [one if isinstance(one, Verdict) else write_key(*one) for one in self._done]
         show_newest(plan.locate() if plan is not None else None)
         return [*map(str, verdicts), summary(verdicts)]

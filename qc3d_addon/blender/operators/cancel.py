@@ -11,7 +11,7 @@ from .common import Status
 
 
 class QC3D_OT_cancel(bpy.types.Operator):
-    """Stop the running bake; nothing is changed"""
+    """Stop the running work; nothing is changed. Esc does the same with the mouse here or over the status bar"""
 
     bl_idname = "qc3d.cancel"
     bl_label = "Cancel"

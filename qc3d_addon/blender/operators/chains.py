@@ -11,12 +11,11 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import live_scrub
 from ..chains import absolute_copy, alembic, keyframes, mirror, remove, to_key
 from ..kinds import keys_of, present
 from ..store import checks
 from ..store.records import Chain, Record
-from .common import SLIDER, OperatorMixin, Status, chosen_chain, poll_chains
+from .common import SLIDER, OperatorMixin, Status, chosen_chain, end_previews, poll_chains
 
 _MOST_FRAMES = 100_000
 
@@ -37,7 +36,7 @@ class ChainWork(OperatorMixin):
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Status:
-        live_scrub.end()
+        end_previews()
         try:
             obj = checks.require_object(context.active_object)
             slider = chosen_chain(obj, self.slider).slider

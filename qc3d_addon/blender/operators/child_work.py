@@ -28,8 +28,9 @@ class ChildWork(OperatorMixin):
     """Plan the work, run it in a child process, write the outcome.
 
     An operator defines ``plan`` and ``write``; one with several plans returns the next from ``following`` and writes
-    all outcomes in ``write_all``. Started from a button it is a modal operator that Esc cancels; called by a script, or
-    without a window, it blocks until the end. Nothing is written unless all of the work was done.
+    all outcomes in ``write_all``. Started from a button it is a modal operator, which Esc cancels with the mouse over
+    the progress; called by a script or without a window, it blocks until the end. Nothing is written unless all of
+    the work was done.
     """
 
     bl_options = {'UNDO'}  # without REGISTER: its adjustment panel would run everything again at each change
@@ -101,7 +102,8 @@ class ChildWork(OperatorMixin):
         return self._guarded(context, lambda: self._begin(context, self.plan(context)))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
-        if event.type == 'ESC' and event.value == 'PRESS':
+        is_escape = event.type == 'ESC' and event.value == 'PRESS'
+        if is_escape and progress_bar.is_at(present(context.window), event.mouse_x, event.mouse_y):
             jobs.cancel()
         if self._job.is_cancelled:
             self.report({'INFO'}, f"{self.bl_label} was canceled; nothing was changed.")

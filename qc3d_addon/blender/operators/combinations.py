@@ -11,11 +11,11 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import compat, live_scrub
+from .. import compat
 from ..combinations import combine, verdicts
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys
-from .common import OperatorMixin, Status, poll_active_object
+from .common import OperatorMixin, Status, end_previews, poll_active_object
 
 
 class CombinationWork(OperatorMixin):
@@ -30,7 +30,7 @@ class CombinationWork(OperatorMixin):
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Status:
-        live_scrub.end()
+        end_previews()
         manager = present(context.window_manager)
         manager.progress_begin(0.0, 1.0)
         said = ""

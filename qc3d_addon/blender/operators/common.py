@@ -10,7 +10,9 @@ import bpy
 from bpy.props import StringProperty
 
 from ...solver.errors import InputError
+from .. import live_scrub
 from ..bake import jobs
+from ..keys import straight
 from ..kinds import keys_of, present
 from ..properties import panel_keys, settings_of
 from ..store import checks
@@ -29,6 +31,12 @@ else:
         options={'SKIP_SAVE'},
     )
     OperatorMixin = object
+
+
+def end_previews() -> None:
+    """Let the file show what was baked, before it is worked on: no moments between, and no straight blend."""
+    live_scrub.end()
+    straight.end()
 
 
 def poll_active_object(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

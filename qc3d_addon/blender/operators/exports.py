@@ -11,10 +11,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
-from .. import live_scrub
 from ..exports import export, read_usd
 from ..kinds import present
-from .common import Status, poll_active_object, poll_chains
+from .common import Status, end_previews, poll_active_object, poll_chains
 
 _FORMATS = (
     ('.usdc', "USD", "Blend shapes with in-betweens: Maya, Unreal, Houdini"),
@@ -72,7 +71,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> Status:
-        live_scrub.end()
+        end_previews()
         try:
             path = _path(self.filepath)
             path = path if path.suffix else path.with_suffix(self.format)
@@ -109,7 +108,7 @@ class QC3D_OT_read_usd(bpy.types.Operator):
         return {'RUNNING_MODAL'}
 
     def execute(self, context: bpy.types.Context) -> Status:
-        live_scrub.end()
+        end_previews()
         try:
             *notes, done = read_usd.read_in_betweens(context.active_object, _path(self.filepath))
         except QC3DError as error:

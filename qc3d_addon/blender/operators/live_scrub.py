@@ -10,6 +10,7 @@ import bpy
 
 from .. import live_scrub
 from ..bake.plan import Plan, plan_preview
+from ..keys import straight
 from ..store import checks
 from .child_work import ChildWork
 from .common import SLIDER, Status, chosen_chain, poll_chains
@@ -46,6 +47,7 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         from ...solver.frames.preview import PreviewCurve
 
+        straight.end()
         chain = chosen_chain(plan.find_object(), self.slider)
         assert outcome.bake is not None
         pairs = len(plan.request.keys) - 1

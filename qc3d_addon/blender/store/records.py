@@ -15,11 +15,12 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import bpy
 
 from ...solver.errors import InputError
+from ...solver.settings import Easing
 from . import id_properties
 from . import stored_values as stored
 from .names import LIMIT, MAX_STEPS
@@ -126,9 +127,17 @@ class Chain:
     @property
     def mode(self) -> str:
         """The mode of the newest bake; empty if unknown."""
+        return self._setting("mode")
+
+    @property
+    def easing(self) -> Easing:
+        """The easing of the newest bake; linear if unknown."""
+        return next((known for known in get_args(Easing) if known == self._setting("easing")), "linear")
+
+    def _setting(self, name: str) -> str:
         settings = self.request.get("settings")
-        mode = settings.get("mode") if isinstance(settings, dict) else None
-        return mode if isinstance(mode, str) else ""
+        value = settings.get(name) if isinstance(settings, dict) else None
+        return value if isinstance(value, str) else ""
 
     @property
     def intervals(self) -> int:

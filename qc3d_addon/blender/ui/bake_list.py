@@ -15,10 +15,10 @@ _LEAST_ROWS, _MOST_ROWS = 2, 5
 
 
 class QC3D_UL_bakes(bpy.types.UIList):
-    """A row for each bake: what plays it, and its value.
+    """A row for each bake: its control and the value of the control.
 
-    Blender lists collections of its own only, and the record of bakes is none: the first shape key stands for the first
-    row, and so on.
+    Blender can list only its own collections, and the record of bakes is none. Therefore the list is drawn over the
+    shape keys: the first key stands for the first row, and so on.
     """
 
     def draw_item(
@@ -56,7 +56,7 @@ class QC3D_UL_bakes(bpy.types.UIList):
 
 
 def draw(layout: bpy.types.UILayout, obj: bpy.types.Object, chains: list[Chain]) -> Chain:
-    """Draw the list where there are several; the chain that is chosen, of those given newest first."""
+    """Draw the list if there are several chains, given newest first; returns the chosen one."""
     settings, keys = settings_of(obj), keys_of(obj)
     if len(chains) > 1:
         rows = min(max(len(chains), _LEAST_ROWS), _MOST_ROWS)

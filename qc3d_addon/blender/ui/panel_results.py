@@ -12,7 +12,7 @@ from ...solver.errors import InputError
 from .. import live_scrub
 from ..chains import to_key
 from ..heat_map import heat_map
-from ..keys import chain_keys
+from ..keys import chain_keys, straight
 from ..keys.double_motion import double_motion
 from ..kinds import keys_of, present, shape_keys_of
 from ..operators.bake_inbetweens import QC3D_OT_rebake
@@ -28,6 +28,7 @@ from ..operators.forget_record import QC3D_OT_forget_record
 from ..operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from ..operators.live_scrub import QC3D_OT_live_scrub
 from ..operators.map_files import QC3D_OT_save_map
+from ..operators.straight import QC3D_OT_straight
 from ..properties import settings_of
 from ..store import checks, kept_measures, records
 from ..store.records import Chain, Record
@@ -107,8 +108,10 @@ def _draw_chain(
         buttons.operator(QC3D_OT_rebake.bl_idname, icon='FILE_REFRESH').slider = chain.slider
         is_on = live_scrub.is_on(obj, chain.slider)
         buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
-        if problem is not None:
-            draw_sentence(context, layout, problem, 'ERROR')
+    is_straight = straight.is_on(keys_of(obj), chain)
+    buttons.operator(QC3D_OT_straight.bl_idname, icon='IPO_LINEAR', depress=is_straight).slider = chain.slider
+    if problem is not None and not chain.mirror_of:
+        draw_sentence(context, layout, problem, 'ERROR')
     if chain.result is not None:
         _draw_result(context, layout, chain, chain.result)
         _draw_distortion(layout, obj, chain)

@@ -1,18 +1,21 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel shows while a rig is active, as in Pose Mode: the sliders of the meshes that it moves."""
+"""The panel while a rig is active, as in Pose Mode: the sliders of the meshes that the rig moves."""
 
 from __future__ import annotations
 
 import bpy
 
+from ..keys import straight
 from ..keys.chain_keys import control_of
+from ..kinds import keys_of
+from ..operators.straight import QC3D_OT_straight
 from ..properties import newest_first
 from .panel_texts import draw_sentence
 
 
 def meshes_of(rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """The meshes in the scenes that a rig moves, by a modifier or as its children, in the order of their names."""
+    """The meshes that a rig moves, by a modifier or as its children, sorted by name."""
     children = set(rig.children_recursive)
     meshes = [obj for obj in bpy.data.objects if obj.type == 'MESH' and obj.users_scene]
     return sorted((obj for obj in meshes if obj in children or _is_deformed(obj, rig)), key=lambda obj: obj.name)
@@ -28,7 +31,12 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, rig: bpy.types.
         for chain in chains:
             control = control_of(obj, chain)
             if control.problem is None:
-                column.prop(*control.shown, text=control.name, slider=True)
+                row = column.row(align=True)
+                row.prop(*control.shown, text=control.name, slider=True)
+                row.context_pointer_set("active_object", obj)  # what the operator works on
+                is_straight = straight.is_on(keys_of(obj), chain)
+                button = row.operator(QC3D_OT_straight.bl_idname, text="", icon='IPO_LINEAR', depress=is_straight)
+                button.slider = chain.slider
             else:
                 draw_sentence(context, column, control.problem, 'ERROR')
     if not baked:

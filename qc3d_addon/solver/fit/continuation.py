@@ -19,6 +19,7 @@ from .fold_free import FoldFreeFitter
 STEP_DEGREES = 20.0  # rotation in one step; each step then takes only a few Newton iterations
 _STEP_ITERATIONS = 12  # at most; steps along the way need not converge
 _PATH_SWEEPS = 4  # the shapes along the way only guide the map, so rough ones will do
+_TARGET_STEP = 2.0**-16  # cube units, to which those shapes are rounded: far above rounding errors, far below the mesh
 _LAST_ITERATIONS = 40  # at most, for the second key
 
 
@@ -45,11 +46,13 @@ def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
     Their number is chosen so that 99 % of the triangles turn by at most about 20 degrees in each step.
     """
     angles = np.degrees(path.turning.angles)
-    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES))) if len(angles) else 1
+    # Rounding must not make it one more.
+    steps = max(1, int(np.ceil(np.percentile(angles, 99) / STEP_DEGREES - 1e-6))) if len(angles) else 1
     moments = [(step / steps, None) for step in range(1, steps)]
-    # The shapes along the way only guide the map; they need not have converged.
+    # The shapes along the way only guide the map; they need not have converged. Rounding them keeps noise from guiding
+    # it elsewhere.
     shapes = [shape for few in batches(moments, path.shapes_at_once) for shape in path.shapes(few, sweeps=_PATH_SWEEPS)]
-    return [*shapes, key1]
+    return [*(np.round(shape / _TARGET_STEP) * _TARGET_STEP for shape in shapes), key1]
 
 
 def follow_path(fitter: FoldFreeFitter, targets: Sequence[Floats]) -> Generator[float, None, FollowedPath]:

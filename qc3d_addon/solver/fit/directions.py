@@ -56,5 +56,5 @@ def half_turned_parts(path: SurfacePath) -> int:
     if np.linalg.norm(path.whole_turn) > np.pi - _AS_LONG:
         return 1
     owners = path.components[path.vertices[path.deformation.faces[:, 0]]]
-    mean = np.linalg.norm(means_by_label(owners, path.turning.swing, path.deformation.weights), axis=1)
+    mean = np.linalg.norm(means_by_label(owners, path.turning.swing - path.rest, path.deformation.weights), axis=1)
     return int((np.abs(mean[path.half_turned] - np.pi) < _AS_LONG).sum())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The density of the energy of maps, half conformal, half of volumes, and its matrix on a tetrahedron."""
+"""Energy density of maps, half a conformal and half a volume term, and its Gauss-Newton matrix on a tetrahedron."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Terms:
 
 
 def energy_density(squares: Floats, determinant: Floats) -> Floats:
-    """(M,) the density, from |J|² (M,) and positive det J (M,); 1 where J is a rotation, the least there is."""
+    """(M,) the density, from |J|² (M,) and positive det J (M,); its minimum is 1, for rotations."""
     shape = (1.0 - VOLUME_SHARE) / 3.0 * squares * determinant ** (-2.0 / 3.0)
     return np.asarray(shape + 0.5 * VOLUME_SHARE * (determinant + 1.0 / determinant))
 
 
 def regularized(determinant: Floats, width: float) -> tuple[Floats, Floats, Floats]:
-    """A positive stand-in for determinants, equal to them where they are large against ``width``, and its derivatives.
+    """Regularized, positive determinants, close to the determinants that are large against ``width``; derivatives.
 
     Garanzha et al. 2021, *Foldover-free maps in 50 lines of code*, equation 3: (D + √(D² + width²)) / 2.
 
@@ -40,7 +40,7 @@ def regularized(determinant: Floats, width: float) -> tuple[Floats, Floats, Floa
     value, first, second : (M,)
     """
     root = np.sqrt(width**2 + determinant**2)
-    # Written so that nothing cancels where the determinant is negative.
+    # In a form without cancellation for negative determinants.
     value = 0.5 * np.where(determinant > 0.0, determinant + root, width**2 / (root + np.abs(determinant)))
     return value, value / root, 0.5 * width**2 / root**3
 

@@ -87,17 +87,18 @@ def _near(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) 
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, faces, options)
+            filled = fill_cube(_in_single_precision(embedding.key0), faces, options)
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
             landmarks = interpolation_matrix(filled.mesh, embedding.key0)
+            rounded = interpolation_matrix(filled.mesh, _in_single_precision(embedding.key0))
         yield Progress("locate", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        fitter = FoldFreeFitter(filled.mesh, landmarks, embedding.weights)
-        followed = yield from staged("fit", follow_path(fitter, targets))
+        fitter = FoldFreeFitter(filled.mesh, rounded, _in_single_precision(embedding.weights))
+        followed = yield from staged("fit", follow_path(fitter, [_in_single_precision(target) for target in targets]))
     yield Progress("fit", 1.0)
     return FittedMap(
         embedding.pair,
@@ -152,6 +153,15 @@ def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -
     with timed(seconds, "path"):
         path = path_between(embedding, options)
         return path, path_to(path, embedding.key1)
+
+
+def _in_single_precision(values: Floats) -> Floats:
+    """Values rounded to single precision.
+
+    A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as keys
+    that were moved, must lead to the same map.
+    """
+    return np.asarray(values, dtype=np.float32).astype(np.float64)
 
 
 def _parts(count: int) -> str:

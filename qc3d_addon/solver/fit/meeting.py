@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The quality ``exact``: a fold-free map that meets both keys.
 
-A coarse map finds the way from key to key (module ``continuation``). It is carried over to tetrahedra as fine as the
-surface's own edges, the few folds that this makes are taken away, and the landmarks' weight is raised until they are
+A coarse map follows the motion from key to key (module ``continuation``). It is transferred to tetrahedra as fine as
+the surface's edges, the few folds that this causes are removed, and the landmarks' weight is increased until they are
 met.
 """
 
@@ -29,22 +29,22 @@ from .fold_free import LANDMARK_WEIGHT, FoldFreeFitter
 from .stiff_landmarks import StiffFitter
 from .unfolding import unfolded_nearby
 
-MET = 1e-4  # of the diagonal: a vertex that is missed by no more is met
+MET = 1e-4  # of the diagonal: a vertex is met if its distance is at most this
 _WEIGHTS = (1e5, 1e6, 1e7, 1e8)
-_ITERATIONS = (15, 15, 12, 6)  # with each weight, at most; of smaller meshes than this up to four times as many
+_ITERATIONS = (15, 15, 12, 6)  # largest number for each weight; up to four times as many for smaller meshes
 _MANY_TETS, _MOST_TIMES = 50_000, 4.0
 _MORE_ROUNDS, _FEW, _PROGRESS = 6, 0.005, 0.9
 _REPAIR_ITERATIONS = 15
-# Landmarks that are missed by more than this part of the diagonal do not pull harder with it: what cannot be reached,
-# such as where a key crosses itself, would hold up all that can.
+# Of the diagonal. Beyond this distance, the force of a landmark no longer grows. Otherwise landmarks that cannot be
+# met, as where a key crosses itself, would keep others from being met.
 _STRONGEST_AT = 1e-3
-_LEAST_WEIGHT = 0.05  # of the mean
-_WEIGHT_AT_CROSSINGS = 1e-2  # of others
+_LEAST_WEIGHT = 0.05  # relative to the mean
+_WEIGHT_AT_CROSSINGS = 1e-2  # relative to that of other landmarks
 
 
 @dataclass(frozen=True, eq=False)
 class MetKeys:
-    """A map that meets both keys, with what was on its way.
+    """A map that meets both keys, with the maps of the motion in between.
 
     Parameters
     ----------
@@ -52,10 +52,9 @@ class MetKeys:
     landmarks : (n, N) sparse
         Barycentric coordinates of the first key's vertices.
     maps : (K + 1, N, 3)
-        Maps without folds on the way, evenly spaced in time: the identity first, the one that meets the second key
-        last.
+        Fold-free maps, evenly spaced in time, from the identity to the one that meets the second key.
     turns : (M, 3)
-        Rotation vectors of the tetrahedra of the last map, in the branch that the motion takes.
+        Rotation vectors of the last map's tetrahedra, in the branch that the motion takes.
     """
 
     mesh: TetMesh
@@ -67,20 +66,20 @@ class MetKeys:
 def meet_keys(
     embedding: Embedding, coarse: TetMesh, mesh: TetMesh, targets: Sequence[Floats]
 ) -> Generator[float, None, MetKeys]:
-    """Find the way with a coarse mesh and meet the second key with a fine one.
+    """Follow the motion with a coarse mesh and meet the second key with a fine one.
 
     Parameters
     ----------
     embedding : Embedding
     coarse, mesh : TetMesh
-        Fillings of the cube; the second one as fine as the surface.
+        Tetrahedral meshes of the cube; the second is as fine as the surface.
     targets : sequence of (n, 3)
-        Where the vertices should be after each step of the way, cube units; the second key last.
+        Target positions of the vertices after each step, in cube units; the last is the second key.
 
     Yields
     ------
     float
-        The part that is done, 0..1.
+        The fraction that is done, in [0, 1].
     """
     base = _weights(embedding)
     coarse_landmarks = interpolation_matrix(coarse, embedding.key0)
@@ -105,7 +104,7 @@ def meet_keys(
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
         maps[-1] = fitter.fit(maps[-1], embedding.key1, round(times * iterations))
         missed = np.linalg.norm(fitter.residuals(maps[-1], embedding.key1), axis=1) / diagonal
-        left = np.count_nonzero(missed[reachable] > MET)
+        left = int(np.count_nonzero(missed[reachable] > MET))
         if missed.max() <= 0.5 * MET:
             break
         # More rounds only where many are left, and as long as they help.
@@ -120,9 +119,9 @@ def meet_keys(
 
 
 def crossing_vertices(embedding: Embedding) -> Bools:
-    """(n,) whether a vertex belongs to triangles that cross in either key, or to triangles beside those.
+    """(n,) whether a vertex belongs to triangles that cross in either key, or to their neighbors.
 
-    No map without folds meets both keys there. All vertices where so many triangles overlap that it is not known.
+    No fold-free map meets both keys there. True for all vertices if too many triangles overlap to be examined.
     """
     faces = embedding.pair.welded_faces
     found = np.zeros(len(embedding.key0), dtype=bool)
@@ -137,7 +136,7 @@ def crossing_vertices(embedding: Embedding) -> Bools:
 
 
 def _carried(fitter: FoldFreeFitter, carry: csr_array, coarse: Floats, before: Floats) -> Floats:
-    """A map without folds (N, 3) near a coarse one, or, where its folds stay, between it and the map before it."""
+    """A fold-free map (N, 3) close to a coarse one or, if its folds remain, between it and the previous map."""
     mesh = fitter.mesh
     values = np.where(mesh.on_cube_face, mesh.points, carry @ coarse)
     found = unfolded_nearby(mesh, values)

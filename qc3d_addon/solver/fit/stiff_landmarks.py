@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fold-free maps with landmarks that pull so hard that they are met.
+"""Fold-free maps with landmark weights that are so large that the landmarks are met.
 
-Two things make that possible. Conjugate gradients are preconditioned by a factored matrix in which the landmarks' own
-weight stands, so that they need no more steps for a larger one. And where a few tetrahedra would fold, only what is
-around them takes a shorter step.
+Two things make this possible. Conjugate gradients are preconditioned by a factored matrix that contains the landmarks'
+weights, so that larger weights need no more iterations. And if a few tetrahedra would fold, the step is shortened only
+around them.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from ..tets.mesh import TetMesh
 from .fold_free import LANDMARK_WEIGHT, FoldFreeFitter, Misfit
 
 _TOLERANCE = 0.06
-_PRODUCTS = 5, 120  # fewer have not seen more than the stiffest equations
-_MANY_PRODUCTS = 25  # after so many the preconditioner is made anew
-_SETTLED = 3e-2  # of what the energy is above its least, the identity's 1
+_PRODUCTS = 5, 120  # smallest and largest number of iterations; fewer only solve the stiffest equations
+_MANY_PRODUCTS = 25  # if a solve needs more, the preconditioner is computed again
+_SETTLED = 3e-2  # relative to the energy above its minimum, the identity's 1
 _HALVINGS = 9
-_LEAST_LENGTH = 1e-3  # of a step that is worth another one
-_LEAST_LEFT = 0.25  # a tetrahedron keeps this part of its determinant in a step
-_GROWTH, _RINGS = 1.25, 24  # how fast steps grow again around what holds them back
+_LEAST_LENGTH = 1e-3  # shorter steps end the iteration
+_LEAST_LEFT = 0.25  # in one step, a determinant may shrink to this fraction
+_GROWTH, _RINGS = 1.25, 24  # growth of the step length per ring around tetrahedra that limit it; number of rings
 
 
 class StiffFitter(FoldFreeFitter):
-    """Fits maps of one mesh to landmarks of large weights.
+    """Fits maps of one mesh to landmarks with large weights.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class StiffFitter(FoldFreeFitter):
         return (length, moved) if length >= _LEAST_LENGTH else (0.0, values)
 
     def _lengths(self, values: Floats, step: Floats) -> Floats:
-        """(N,) how far each vertex may go along a step: short around tetrahedra that would fold, growing away."""
+        """(N,) step length of each vertex: short around tetrahedra that would fold, and growing away from them."""
         at, change = self.mesh.jacobians(values), self.mesh.jacobians(step)
         least = _LEAST_LEFT * determinants(at)
         of_tets = np.ones(len(least))

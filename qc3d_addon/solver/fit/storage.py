@@ -19,7 +19,7 @@ from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from .fitted_map import FittedMap
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 _SEAL_LENGTH = 32
 _DAMAGED = "The stored map is damaged; fit the keys again."
 _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folds taken away around them alone: the energy made finite on folds, and lowered until none is left."""
+"""Removes folds locally: lowers an energy that is finite on folds, only around them, until none is left."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
 from .energy_density import Terms, derivatives, energy_density, projected_blocks, regularized
 
-# For each attempt: rings of tetrahedra around the folds that give way, first width of the determinants' stand-in.
+# For each attempt: number of rings of tetrahedra around the folds that may move, and first width of the regularization.
 _ATTEMPTS = ((1, 0.0), (2, 0.3), (3, 0.3), (4, 0.5), (6, 0.5))
 _STEPS = 25
 _NARROWEST, _SHARE = 1e-3, 0.1  # the width follows the worst determinant
@@ -23,16 +23,16 @@ _BACKTRACKS = 10
 
 
 def unfolded_nearby(mesh: TetMesh, values: Floats) -> Floats | None:
-    """Values (N, 3) of a map without folds that differs from a map with few folds only around these; None if not found.
+    """Values (N, 3) of a fold-free map that differs from a map with few folds only around these; None if not found.
 
-    Every tetrahedron counts alike, small ones too. Garanzha et al. 2021, *Foldover-free maps in 50 lines of code*, with
-    Newton's method.
+    All tetrahedra have the same weight. Garanzha et al. 2021, *Foldover-free maps in 50 lines of code*, with Newton's
+    method.
 
     Parameters
     ----------
     mesh : TetMesh
     values : (N, 3)
-        Coordinates that the cube's faces hold do not change.
+        Values of the map with folds. Coordinates that are fixed on the cube's faces do not change.
     """
     for rings, width in _ATTEMPTS:
         determinant = determinants(mesh.jacobians(values))
@@ -43,7 +43,7 @@ def unfolded_nearby(mesh: TetMesh, values: Floats) -> Floats | None:
 
 
 def _relaxed(mesh: TetMesh, values: Floats, folded: Bools, rings: int, width: float) -> Floats:
-    """The map after some Newton steps of the vertices that are at most so many rings from folded tetrahedra."""
+    """The map after Newton steps of the vertices within ``rings`` rings of folded tetrahedra."""
     around = mesh.incidence
     moving = around @ folded > 0.0
     for _ in range(rings - 1):
@@ -81,7 +81,7 @@ def _relaxed(mesh: TetMesh, values: Floats, folded: Bools, rings: int, width: fl
 
 
 def _chained(terms: Terms, first: Floats, second: Floats) -> Terms:
-    """Derivatives by determinants from those by their stand-ins, with the stand-ins' own."""
+    """Derivatives with respect to determinants, from those with respect to regularized ones, by the chain rule."""
     curvature = terms.curvature * first**2 + terms.slope * second
     return Terms(terms.density, terms.linear, terms.slope * first, terms.mixed * first, curvature)
 

@@ -37,7 +37,7 @@ class ExtraSpins:
         still = embedding.still
         whole = not still.any()
         labels = np.zeros(len(still), dtype=np.int64) if whole else surface.components
-        directions = embedding.motion.turn[None] if whole else _mean_turns(surface, labels)
+        directions = embedding.motion.turn + (np.zeros((1, 3)) if whole else _mean_turns(surface, labels))
         sizes = np.linalg.norm(directions, axis=1)
         free = (sizes > _LEAST_TURN) & ~_held(embedding.key0, still, labels) & (turns != 0)
         self._vertices = np.flatnonzero(free[labels])

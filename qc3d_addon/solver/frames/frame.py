@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Floats
 from ..fit.fitted_map import FittedMap
 from ..numerics.rotations import determinants
+from .alignment import RigidMove
 from .report import Certificate
 
 
@@ -37,12 +38,23 @@ class Frame:
 
     @classmethod
     def of(
-        cls, fitted: FittedMap, positions: Floats, values: Floats, time: float, repaired: bool, crossings: int | None
+        cls,
+        fitted: FittedMap,
+        positions: Floats,
+        values: Floats,
+        time: float,
+        repaired: bool,
+        crossings: int | None,
+        move: RigidMove | None = None,
     ) -> Frame:
-        """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube."""
+        """A frame at ``time`` from its positions (n, 3), keys' coordinates, and its map's values (N, 3) in the cube.
+
+        ``move`` carries the map to the frame.
+        """
         determinant = determinants(fitted.mesh.jacobians(values))
         worst = int(np.argmin(determinant))
-        place = fitted.embedding.from_cube(values[fitted.mesh.tets[worst]].mean(axis=0)[None], time)[0]
+        middle = values[fitted.mesh.tets[worst]].mean(axis=0)[None]
+        place = fitted.embedding.from_cube(middle if move is None else move.apply(middle), time)[0]
         folds = int((determinant <= 0.0).sum())
         carried = fitted.embedding.from_cube(fitted.landmarks @ values, time)
         missed = float(np.linalg.norm((positions - carried) / fitted.pair.diagonal, axis=1).max())

@@ -28,7 +28,11 @@ def join(makers: Sequence[NaturalFrames]) -> list[NaturalFrames]:
     rates = [list(maker.end_rates()) for maker in makers]
     for left in range(len(makers) - 1):
         rates[left][1], rates[left + 1][0] = _shared_rates(makers, left, rates[left][1], rates[left + 1][0])
-    joined = [maker.with_end_rates(first, second) for maker, (first, second) in zip(makers, rates, strict=True)]
+    last = len(makers) - 1
+    joined = [
+        maker.with_end_rates(first, second, (number > 0, number < last))
+        for number, (maker, (first, second)) in enumerate(zip(makers, rates, strict=True))
+    ]
     velocities = [[_velocity(maker, end) for end in (0, 1)] for maker in joined]
     slopes = [[np.zeros_like(velocity) for velocity in ends] for ends in velocities]
     for left in range(len(joined) - 1):

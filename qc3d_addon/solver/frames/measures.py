@@ -97,7 +97,9 @@ class VertexMeasures:
         self._before = [np.broadcast_to(np.eye(3), (self._count, 3, 3))]
         for number, part in enumerate(fitted[:-1]):
             whole = part.embedding.motion.rotation @ self._jacobians(number, part.mapped)
-            self._before.append(whole @ self._before[-1])
+            # From the axes of one cube to those of the next, by way of the keys'.
+            between = fitted[number + 1].embedding.axes @ part.embedding.axes.T
+            self._before.append(between @ whole @ self._before[-1])
 
     def of(self, number: int, positions: Floats, values: Floats) -> dict[str, Floats]:
         """Measures (n,) by name of a frame of pair ``number``.

@@ -20,6 +20,7 @@ from ..numerics.rotation_unwrapping import Turning, swing_beside
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
+from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
@@ -45,7 +46,8 @@ class NaturalFrames:
         embedding, mesh = fitted.embedding, fitted.mesh
         self._surface = fitted.surface_path
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
-        if fitted.options.extra_turns and not self._spins and np.array_equal(self.still, embedding.still):
+        turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
+        if fitted.options.extra_turns and not turns:
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         faces = fitted.pair.welded_faces
         with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
@@ -53,6 +55,7 @@ class NaturalFrames:
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
+        self._alignment = CalmAlignment(embedding, turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
@@ -84,21 +87,27 @@ class NaturalFrames:
 
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates at both keys, in the keys' own coordinates."""
-        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**-3
+        embedding = self._fitted.embedding
+        motion, axes, volume = embedding.motion, embedding.axes, embedding.scale**-3
         first, second = self._surface.end_rates()
-        spins = (first.spin + motion.turn, second.spin @ motion.rotation.T + motion.turn)
+        spins = ((first.spin + motion.turn) @ axes, (second.spin @ motion.rotation.T + motion.turn) @ axes)
         return Rates(spins[0], first.strain, volume * first.growth), Rates(
             spins[1], second.strain, volume * second.growth
         )
 
-    def with_end_rates(self, first: Rates, second: Rates) -> NaturalFrames:
-        """The same in-betweens with other rates at the two keys, in the keys' own coordinates."""
-        motion, volume = self._fitted.embedding.motion, self._fitted.embedding.scale**3
-        spins = (first.spin - motion.turn, (second.spin - motion.turn) @ motion.rotation)
+    def with_end_rates(self, first: Rates, second: Rates, inner: tuple[bool, bool]) -> NaturalFrames:
+        """The same in-betweens with other rates at the two keys, in the keys' own coordinates.
+
+        ``inner`` tells which of the two lies between this pair and another one.
+        """
+        embedding = self._fitted.embedding
+        motion, axes, volume = embedding.motion, embedding.axes.T, embedding.scale**3
+        spins = (first.spin @ axes - motion.turn, (second.spin @ axes - motion.turn) @ motion.rotation)
         changed = copy.copy(self)
         changed._surface = self._surface.with_end_rates(
             Rates(spins[0], first.strain, volume * first.growth), Rates(spins[1], second.strain, volume * second.growth)
         )
+        changed._alignment = self._alignment.beside(inner)
         return changed
 
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
@@ -109,7 +118,8 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
-        return self._placed(self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0], time)
+        shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
+        return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
         """One frame for each of ``times`` (k,) in 0..1, out of colliders; yields the finished share, 0..1."""
@@ -128,15 +138,16 @@ class NaturalFrames:
             embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
             pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
             positions, crossings = pieces.apart(self._limit, times, positions, crossings)
+        moves = [self._alignment.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
         if resolver is not None:
-            positions = yield from self._cleared(resolver, times, volumes, positions)
+            positions = yield from self._cleared(resolver, times, volumes, positions, moves)
             crossings = list(in_threads(self._limit.excess, positions))
-        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, crossings, strict=True))
+        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, moves, crossings, strict=True))
         return list(made)
 
-    def _certified(self, moment: tuple[float, Floats, Floats, int | None]) -> Frame:
-        """The frame of a time, its map's values, its surface's cube positions and its excess of crossings."""
-        time, values, positions, crossings = moment
+    def _certified(self, moment: tuple[float, Floats, Floats, RigidMove, int | None]) -> Frame:
+        """The frame of a time, its map's values, its surface in the cube, where it goes and its excess of crossings."""
+        time, values, shape, move, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
         found = self._volume.followed(time, values)
         repaired = self._fitted.folds(found) > 0
@@ -144,7 +155,8 @@ class NaturalFrames:
             found, repaired = values, False
         if repaired:
             found = self._fitted.unfolded(found, time)
-        return Frame.of(self._fitted, self._placed(positions, time), found, time, repaired, crossings)
+        positions = self._finished(shape, time, move)
+        return Frame.of(self._fitted, positions, found, time, repaired, crossings, move)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
         """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
@@ -152,10 +164,10 @@ class NaturalFrames:
         shapes = self._shaped(self._surface, self._moments(maps, times))
         return maps, shapes, [self._limit.excess(shape) for shape in shapes]
 
-    def _placed(self, shape: Floats, time: float) -> Floats:
-        """Cube positions (n, 3) in the keys' coordinates; what both keys leave in place is there bit for bit."""
+    def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
+        """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._fitted.embedding.from_cube(shape, time)
+        positions = self._fitted.embedding.from_cube(move.apply(shape), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -203,7 +215,12 @@ class NaturalFrames:
         return positions, excess
 
     def _cleared(
-        self, resolver: CollisionResolver, times: Floats, volumes: list[Floats], positions: list[Floats]
+        self,
+        resolver: CollisionResolver,
+        times: Floats,
+        volumes: list[Floats],
+        positions: list[Floats],
+        moves: list[RigidMove],
     ) -> Generator[float, None, list[Floats]]:
         """Resolve collisions: push vertices out of colliders and solve the surface around them again, repeatedly."""
         embedding = self._fitted.embedding
@@ -213,11 +230,11 @@ class NaturalFrames:
             yield attempt / (_PUSHES + 1)
             nearby, pushed = [], []
             for index, time in enumerate(moments):
-                place = self._placed(positions[index], time)
+                place = self._finished(positions[index], time, moves[index])
                 near, moved = resolver.pushed(index, place, time)
                 nearby.append(near & ~self.still)
-                push = np.where(nearby[-1][:, None], embedding.vectors_to_cube(moved - place, time), 0.0)
-                pushed.append(positions[index] + push)
+                push = moves[index].undo_vectors(embedding.vectors_to_cube(moved - place, time))
+                pushed.append(positions[index] + np.where(nearby[-1][:, None], push, 0.0))
             if not any(near.any() for near in nearby):
                 return positions
             # The last push stands as it is; so does the only one where extra turns come on top of the surface's path.

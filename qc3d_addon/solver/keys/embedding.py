@@ -17,11 +17,17 @@ from ..triangles.deformation import TriangleDeformation
 from ..triangles.geometry import areas, vertex_areas
 from ..triangles.topology import face_adjacency, welded
 from .keypair import KeyPair
+from .own_axes import own_axes
 
 STILL_TOLERANCE = 1e-6  # of the diagonal: above rounding in single precision, below what an animator would pose
+# Of the size: what travels less is held the more strongly the less it travels, so that it makes no difference whether a
+# vertex is just still or just not.
+NEARLY_STILL = 1e-4
 # Distance of the keys from the cube's faces: the volume around them needs room to move, and in-betweens may reach a
 # little beyond both keys.
 MARGIN = 0.17
+# Where this part of the surface is still, it holds the whole.
+_MOST_HELD = 0.04
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +62,23 @@ class RigidMotion:
         return cls._of_turn(best_turns(covariance[None])[0], source_centre, target_centre)
 
     @classmethod
-    def of_surface(cls, source: Floats, target: Floats, faces: Ints) -> RigidMotion:
+    def of_surface(cls, source: Floats, target: Floats, faces: Ints, shares: Floats | None = None) -> RigidMotion:
         """Mean rigid motion of a surface from the shape ``source`` (n, 3) to the shape ``target`` (n, 3).
 
         The rotation is the area-weighted mean of the triangles' unwrapped rotations; the translation carries the
         centroid along. Without usable triangles, it is the least-squares fit of the positions. That fit would be wrong
-        where wings flap or ends twist: there it can be half a turn away from the rotation of every triangle.
+        where wings flap or ends twist: there it can be half a turn away from the rotation of every triangle. What
+        triangles count is multiplied by ``shares`` (m,).
         """
-        weights = vertex_areas(source, faces)
+        share = np.ones(len(faces)) if shares is None else shares
+        weights = vertex_areas(source, faces, share)
         vertices, group = welded(source, target)
         deformation = TriangleDeformation.between(source[vertices], target[vertices], group[faces])
         if not len(deformation.faces):
             return cls.between(source, target, weights)
         # Symmetric in both keys, and independent of their scale.
         sizes = np.sqrt(np.prod([areas(key[vertices], deformation.faces) for key in (source, target)], axis=0))
-        turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes)
+        turn = mean_turn(deformation.turns, face_adjacency(deformation.faces), sizes * share[deformation.rows])
         return cls._of_turn(turn, *(np.average(key, axis=0, weights=weights) for key in (source, target)))
 
     @classmethod
@@ -82,6 +90,10 @@ class RigidMotion:
     def rotation(self) -> Floats:
         """(3, 3) rotation matrix of the whole motion."""
         return np.asarray(rotation_matrices(self.turn[None])[0])
+
+    def part(self, share: float) -> RigidMotion:
+        """The motion up to ``share``, 0..1, of its way."""
+        return RigidMotion(share * self.turn, share * self.velocity)
 
     def apply(self, points: Floats, time: float = 1.0) -> Floats:
         """Points (n, 3) moved along the screw up to ``time``: 0 is the start, 1 the whole motion."""
@@ -98,21 +110,28 @@ class RigidMotion:
 class Embedding:
     """How a pair lies in the unit cube: one similarity for both keys, and the rigid motion removed from the second.
 
+    The cube stands along axes that the keys define themselves: keys that are moved, turned and scaled alike come to lie
+    in it in the same way.
+
     Parameters
     ----------
     pair : KeyPair
-    still : (n,) bool
-        Still vertices: those that both keys leave in place. If there are any, ``motion`` is the identity.
+    axes : (3, 3)
+        Orthonormal rows: the axes of the cube in the keys' coordinates.
+    travel : (n,)
+        Distances between the two positions of each vertex, relative to the diagonal of the first key along the axes.
     motion : RigidMotion
-        Mean rigid motion of the surface from the first key to the second, in the keys' own units.
+        Mean rigid motion of the surface from the first key to the second, in the keys' own units, in coordinates along
+        the axes; only a part of it, or nothing, where some of the surface is still.
     centre : (3,)
-        The point that goes to the center of the cube.
+        The point that goes to the center of the cube, in coordinates along the axes.
     scale : float
         Cube units per unit of the keys.
     """
 
     pair: KeyPair
-    still: Bools
+    axes: Floats
+    travel: Floats
     motion: RigidMotion
     centre: Floats
     scale: float
@@ -120,28 +139,42 @@ class Embedding:
     @classmethod
     def of(cls, pair: KeyPair) -> Embedding:
         """Embed a pair so that both keys, the second without its rigid motion, just fit into [0.17, 0.83]³."""
-        still = np.linalg.norm(pair.key1 - pair.key0, axis=1) <= STILL_TOLERANCE * pair.diagonal
-        motion = (
-            RigidMotion.identity() if still.any() else RigidMotion.of_surface(pair.key0, pair.key1, pair.faces)
-        )
-        both = np.concatenate([pair.key0, motion.undo(pair.key1)])
+        faces, shares = pair.covering
+        areas = vertex_areas(pair.key0, faces, shares)
+        axes = own_axes(pair.key0, pair.key1, areas)
+        key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
+        diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
+        travel = np.linalg.norm(key1 - key0, axis=1) / diagonal
+        moves = _free_part(travel, areas)
+        motion = RigidMotion.of_surface(key0, key1, faces, shares).part(moves) if moves else RigidMotion.identity()
+        both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())
         scale = (1.0 - 2.0 * MARGIN) / (size if size > 0.0 else pair.diagonal)
-        return cls(pair, still, motion, 0.5 * (low + high), scale)
+        return cls(pair, axes, travel, motion, 0.5 * (low + high), scale)
 
-    def to_cube(self, points: Floats) -> Floats:
-        """Points (k, 3) in cube units, given in the keys' units."""
-        return np.asarray((points - self.centre) * self.scale + 0.5)
+    @cached_property
+    def still(self) -> Bools:
+        """(n,) still vertices: those that both keys leave in place."""
+        return np.asarray(self.travel <= STILL_TOLERANCE)
+
+    def to_cube(self, points: Floats, time: float = 0.0) -> Floats:
+        """Points (k, 3) in cube units, given in the keys' units at ``time`` (0..1) of the rigid motion."""
+        moved = self.motion.apply(points @ self.axes.T, -time)
+        return np.asarray((moved - self.centre) * self.scale + 0.5)
 
     def from_cube(self, points: Floats, time: float) -> Floats:
         """Points (k, 3) in the keys' units, given in cube units, moved along the rigid motion up to ``time`` (0..1)."""
-        return self.motion.apply((points - 0.5) / self.scale + self.centre, time)
+        return np.asarray(self.motion.apply((points - 0.5) / self.scale + self.centre, time) @ self.axes)
+
+    def straight(self, time: float) -> Floats:
+        """(n, 3) cube positions at ``time`` that ``from_cube`` takes to the straight lines between the keys."""
+        return self.to_cube(self.pair.key0 + time * (self.pair.key1 - self.pair.key0), time)
 
     def vectors_to_cube(self, vectors: Floats, time: float) -> Floats:
         """Displacements (k, 3) at ``time`` in cube units, given in the keys' units: ``from_cube`` inverted."""
         rotation = rotation_matrices(time * self.motion.turn[None])[0]
-        return np.asarray(self.scale * (vectors @ rotation))
+        return np.asarray(self.scale * (vectors @ self.axes.T @ rotation))
 
     @cached_property
     def key0(self) -> Floats:
@@ -151,10 +184,27 @@ class Embedding:
     @cached_property
     def key1(self) -> Floats:
         """(n, 3) the second key in cube units, without its rigid motion."""
-        return self.to_cube(self.motion.undo(self.pair.key1))
+        return self.to_cube(self.pair.key1, 1.0)
 
     @cached_property
     def weights(self) -> Floats:
         """(n,) vertex areas of the first key, normalized to the sum 1; a loose vertex has a small positive weight."""
-        areas = vertex_areas(self.key0, self.pair.faces)
+        areas = vertex_areas(self.key0, *self.pair.covering)
         return np.asarray(areas / areas.sum())
+
+
+def _free_part(travel: Floats, areas: Floats) -> float:
+    """How much of the whole's motion is to be taken out, 1 where nothing is still.
+
+    It falls gradually with the part of the surface that is still or nearly so: one vertex more or less must not matter.
+
+    Parameters
+    ----------
+    travel : (n,)
+        Distances between the keys over the size.
+    areas : (n,)
+        Of the surface around the vertices.
+    """
+    held = float(areas @ (1.0 / (1.0 + (travel / NEARLY_STILL) ** 2))) / float(areas.sum())
+    part = min(held / _MOST_HELD, 1.0)
+    return 1.0 - part * part * (3.0 - 2.0 * part)

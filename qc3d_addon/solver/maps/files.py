@@ -189,7 +189,7 @@ def require_format(path: Path) -> None:
         return
     corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
     one = TetFile(corners, np.array([[0, 1, 2, 3]]), {TARGET: 2.0 * corners}, {STRETCH: np.ones((1, 6))})
-    with PrivateFolder() as folder:
+    with PrivateFolder(path.parent) as folder:  # beside the output, where it must be possible to write anyway
         trial = folder / f"trial{path.suffix}"
         put_tets(trial, one, path)
         try:

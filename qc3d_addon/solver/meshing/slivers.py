@@ -40,7 +40,9 @@ def triangulate(samples: Floats) -> Ints:
 
     Tetrahedra with all corners on one face of the cube have no volume; they occur only along the hull and are left out.
     """
-    tets: Ints = np.asarray(Delaunay(samples).simplices, dtype=np.int64)
+    # In an order of their own: the one in which they are found depends on rounding, and what follows draws lots.
+    tets: Ints = np.sort(np.asarray(Delaunay(samples).simplices, dtype=np.int64), axis=1)
+    tets = tets[np.lexsort(tets.T[::-1])]
     negative = np.linalg.det(edge_matrices(samples, tets)) < 0.0
     tets[negative] = tets[negative][:, [0, 1, 3, 2]]
     corners = samples[tets]

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tetrahedra as fine as a surface's own edges: a sample beside every vertex, so that a map can meet each of them.
+"""Tetrahedra as fine as a surface's edges: with a sample beside every vertex, a map can meet all vertices.
 
-A map of tetrahedra can meet the vertices inside them where it has freedom for each. With a sample of its own next to
-every vertex it has, also where edges are short, such as at fingers and lips. Away from the surface tetrahedra grow.
+A piecewise linear map can meet the vertices inside its tetrahedra if it has a degree of freedom for each. A sample
+beside every vertex ensures this, also where edges are short, as at fingers and lips. Away from the surface the
+tetrahedra grow.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from ..triangles.topology import without_piles
 from .poisson_disk import RESOLUTIONS, SizeField, sample_cube, thin
 from .slivers import Effort, sliver_free
 
-# The distance between samples at the surface, in local lengths of edges: for a map that finds its way, and for one that
+# Spacing of samples at the surface, in local edge lengths: for the map that follows the motion, and for the one that
 # meets the keys.
 COARSE_SHARE, FINE_SHARE = 2.0, 0.7
-_NEAREST = 6  # vertices around each whose mean distance is the local length of edges
-# Vertices that are much nearer than that lie on another sheet, across a gap that has to open.
+_NEAREST = 6  # nearest vertices whose mean distance defines the local edge length
+# Much nearer vertices belong to another sheet, across a gap that has to be resolved. Factor on their distance.
 _GAP = 1.6
 _SLOPE = 0.6  # growth of the distance between samples away from the surface
 _APART = 0.6  # vertices nearer than this part of the local distance share a sample, with a share below 1
@@ -46,7 +47,7 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
     faces : (m, 3) int64
         Triangles, in any state; may be empty.
     share : float
-        The distance between samples at the surface, in local lengths of edges; below 1 every vertex has a sample.
+        Spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample.
     seed : int
     """
     rng = np.random.default_rng(seed)
@@ -64,7 +65,7 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
 
 
 def size_around(points: Floats, share: float) -> SizeField:
-    """The distance between samples around vertices (n, 3), nowhere larger than with the quality ``normal``."""
+    """The spacing of samples around vertices (n, 3), nowhere larger than with quality ``normal``."""
     normal = RESOLUTIONS["normal"]
     places = np.unique(points, axis=0)
     tree = cKDTree(places)
@@ -87,7 +88,7 @@ def size_around(points: Floats, share: float) -> SizeField:
 
 
 def _between(vertices: Floats, points: Floats, faces: Ints, size: SizeField, rng: np.random.Generator) -> Floats:
-    """(k, 3) samples of triangles that are large for the local distance, apart from the samples at vertices."""
+    """(k, 3) samples on triangles that are large for the local spacing, at a distance from the samples of vertices."""
     sizes = areas(points, faces)
     corners = points[faces]
     expected = _OVERSAMPLING * sizes / size(corners.mean(axis=1)) ** 2 if len(faces) else np.empty(0)

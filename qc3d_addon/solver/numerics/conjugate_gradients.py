@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preconditioned conjugate gradients that end by the preconditioned residual.
+"""Preconditioned conjugate gradients that stop by the norm of the preconditioned residual.
 
 The common ending, by the plain residual, is too early for stiff systems: the first step meets the stiffest equations,
 and what is left of the others hardly shows.
@@ -25,18 +25,19 @@ def conjugate_gradients(
     Parameters
     ----------
     multiply, precondition : callable
-        Take vectors (n,) to A times them, and to about A⁻¹ times them, which is symmetric positive definite too.
+        Functions of vectors x (n,): A x, and a symmetric positive definite approximation of A⁻¹ x.
     load : (n,)
     tolerance : float
-        The end is where rᵀ M⁻¹ r, of the residual r and the preconditioner M, is this squared times its first value.
+        With the residual r and the preconditioner M, the iteration stops when rᵀ M⁻¹ r has decreased by the square of
+        this.
     steps : (int, int)
-        At least so many steps are taken, unless the residual vanishes, and at most so many.
+        Smallest number of iterations, unless the residual vanishes, and largest number.
 
     Returns
     -------
     solution : (n,)
     taken : int
-        How many steps were taken.
+        Number of iterations.
     """
     solution, residual = np.zeros_like(load), load.copy()
     corrected = precondition(residual)

@@ -27,6 +27,7 @@ from .rotations import nearest_branch, products, rotation_matrices, rotation_vec
 _MOST_SWING = 1.55 * np.pi
 # Share of a part's weight that must turn further than that: a few badly shaped triangles must not decide for the part.
 _FAIR_SHARE = 0.02
+_DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
 # Parts that turn by less than this short of half a turn, or beyond it, have two ways of about the same length.
 _HALF_TURN = np.radians(30.0)
 _MEAN_STEPS = 30  # a cap: rotations that are spread all around may have no unique mean
@@ -66,10 +67,17 @@ class Turning:
     @property
     def angles(self) -> Floats:
         """(m,) angle by which each element turns in all, radians."""
-        return np.asarray(np.maximum(np.linalg.norm(self.swing, axis=1), np.linalg.norm(self.twist, axis=1)))
+        return self.angles_from(np.zeros(3))
+
+    def angles_from(self, rest: Floats) -> Floats:
+        """(m,) angle by which each element turns relative to the rotation vector ``rest`` (3,), radians."""
+        parts = (self.swing, self.twist) if self.twist.any() else (self.swing - rest,)
+        return np.asarray(np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0))
 
 
-def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools) -> Turning:
+def consistent_turning(
+    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats | None = None
+) -> Turning:
     """Unwrap the rotations of all elements, so that neighbors agree, also beyond 180 and 360 degrees.
 
     Parameters
@@ -84,6 +92,8 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
         Positive weights of the elements when the axis of their part is computed.
     held : (m,) bool
         Whether an element has a still vertex.
+    rest : (3,), optional
+        Rotation vector of what is still, where a motion of the whole was removed from everything.
 
     Notes
     -----
@@ -91,15 +101,23 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
     turn, where the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
     into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
-    In each part the element that turns least takes the short way round. A part without still vertices, such as a
-    button on a sleeve, takes the branch of the nearest element of the largest part.
+    In each part the element that turns least takes the short way round; in a part with still vertices the one whose
+    rotation is nearest to ``rest``. A part without still vertices, such as a button on a sleeve, takes the branch of
+    the nearest element of the largest part.
     """
     count = len(turns)
     if not count:
         return Turning(turns.copy(), turns.copy())
     forest = _Forest(turns, adjacency)
     loose = ~np.isin(forest.labels, forest.labels[held])
-    vectors = _agreeing_parts(forest, forest.carried(turns, nearest_branch), centres, loose)
+    started, angles = turns, np.linalg.norm(turns, axis=1)
+    if rest is not None and rest.any():
+        resting = np.broadcast_to(rest, turns.shape)
+        angles = np.where(loose, angles, _relative_angles(turns, resting))
+        rests = ~loose & (angles < 0.5 * np.pi)
+        started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
+    forest = forest.rooted(angles)
+    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
@@ -111,7 +129,7 @@ def consistent_turning(turns: Floats, adjacency: Ints, centres: Floats, weights:
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
 
 
-def half_turned(turning: Turning, weights: Floats, labels: Ints) -> Ints:
+def half_turned(turning: Turning, weights: Floats, labels: Ints, rest: Floats) -> Ints:
     """The parts whose elements turn, on average, by about half a turn, by whose numbers ``labels`` (m,) call them.
 
     Parameters
@@ -121,8 +139,10 @@ def half_turned(turning: Turning, weights: Floats, labels: Ints) -> Ints:
         Positive weights of the elements.
     labels : (m,) int64
         Part of every element.
+    rest : (3,)
+        Rotation vector of what does not turn.
     """
-    mean = np.linalg.norm(means_by_label(labels, turning.swing, weights), axis=1)
+    mean = np.linalg.norm(means_by_label(labels, turning.swing - rest, weights), axis=1)
     twisted = sums_by_label(labels, turning.twist.any(axis=1).astype(np.float64)) > 0.0
     return np.flatnonzero((np.abs(mean - np.pi) < _HALF_TURN) & ~twisted)
 
@@ -153,7 +173,8 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     mean = np.eye(3)
     for _ in range(_MEAN_STEPS):
         beside = rotation_vectors(mean.T @ rotations)
-        step = shares @ forest.rooted(beside).carried(beside, nearest_branch)
+        rooted = forest.rooted(np.linalg.norm(beside, axis=1))
+        step = shares @ rooted.carried(beside, nearest_branch)
         mean = mean @ rotation_matrices(step[None])[0]
         if np.linalg.norm(step) < _MEAN_FOUND:
             break
@@ -189,27 +210,26 @@ def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
 
 
 class _Forest:
-    """Minimum spanning trees of the relative rotations, one for each part, rooted at the element that turns least."""
+    """Minimum spanning trees of the relative rotations, one for each part."""
 
     def __init__(self, turns: Floats, adjacency: Ints) -> None:
         count = len(turns)
         first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 accepts no other index type
         # Sparse graphs drop edges of cost zero.
-        cost = _relative_angles(turns[first], turns[second]) + 1e-9
+        cost = np.round(_relative_angles(turns[first], turns[second]), _DIGITS) + 10.0**-_DIGITS
         tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
         self.labels: Ints = np.asarray(connected_components(tree, directed=False)[1], dtype=np.int64)
         self._edges: list[Ints] = [end.astype(np.int64) for end in tree.nonzero()]
-        self._root(turns)
 
-    def rooted(self, turns: Floats) -> _Forest:
-        """The same trees with roots chosen for ``turns`` (m, 3): the rotations relative to a common one."""
+    def rooted(self, angles: Floats) -> _Forest:
+        """The same trees, each rooted at the element with the smallest of ``angles`` (m,)."""
         other = copy.copy(self)
-        other._root(turns)
+        other._root(angles)
         return other
 
-    def _root(self, turns: Floats) -> None:
-        count, labels = len(turns), self.labels
-        by_angle = np.lexsort((np.linalg.norm(turns, axis=1), labels))
+    def _root(self, angles: Floats) -> None:
+        count, labels = len(angles), self.labels
+        by_angle = np.lexsort((np.round(angles, _DIGITS), labels))
         self.roots: Ints = by_angle[np.searchsorted(labels[by_angle], np.arange(labels.max() + 1))]
         # An extra node joins all roots, so that one breadth-first search covers every part.
         rows, columns = self._edges

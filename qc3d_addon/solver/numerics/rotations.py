@@ -15,6 +15,8 @@ from ..arrays import Floats
 _NEWTON_STEPS = 20  # a cap; scaled Newton converges in about ten
 _SMALL_ANGLE = 1e-4  # radians; below this the first omitted term of the series, angle^4 / 120, is below rounding
 _NO_ANGLE = 1e-12  # radians; below this the axis is lost to rounding
+_HALF_TURN = 1e-6  # cosines of half the angle below this belong to half turns, up to rounding in single precision
+_HALF_TURN_SIDE = np.array([0.83, 0.46, 0.31])  # perpendicular to none of the axes that symmetric shapes turn about
 
 
 def by_component(matrices: Floats) -> Floats:
@@ -82,7 +84,11 @@ def _closest_rotations_svd(matrices: Floats) -> Floats:
 
 
 def rotation_vectors(rotations: Floats) -> Floats:
-    """(k, 3) rotation vectors, axis times angle in radians, of rotation matrices (k, 3, 3); angles are in [0, pi]."""
+    """(k, 3) rotation vectors, axis times angle in radians, of rotation matrices (k, 3, 3); angles are in [0, pi].
+
+    Of the two vectors of a half turn always the same one is returned, whatever the rounding; its angle may exceed pi by
+    2e-6.
+    """
     quaternions = _quaternions(rotations)
     vector, scalar = quaternions[:, 1:], quaternions[:, 0]
     sine = np.linalg.norm(vector, axis=1)
@@ -91,7 +97,10 @@ def rotation_vectors(rotations: Floats) -> Floats:
 
 
 def _quaternions(rotations: Floats) -> Floats:
-    """(k, 4) unit quaternions with scalar part first and >= 0; stable for every angle (Shepperd 1978)."""
+    """(k, 4) unit quaternions with scalar part first and >= 0; stable for every angle (Shepperd 1978).
+
+    Where the scalar part is zero up to rounding, the vector part points towards ``_HALF_TURN_SIDE``.
+    """
     diagonal = np.einsum("kii->ki", rotations)
     trace = diagonal.sum(axis=1)
     skew = np.stack(
@@ -114,7 +123,8 @@ def _quaternions(rotations: Floats) -> Floats:
     best = np.argmax(np.einsum("kii->ki", table), axis=1)
     quaternions = table[np.arange(count), best]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return np.asarray(quaternions * np.where(quaternions[:, :1] < 0.0, -1.0, 1.0))
+    side = np.where(np.abs(quaternions[:, 0]) < _HALF_TURN, quaternions[:, 1:] @ _HALF_TURN_SIDE, quaternions[:, 0])
+    return np.asarray(quaternions * np.where(side < 0.0, -1.0, 1.0)[:, None])
 
 
 def rotation_matrices(vectors: Floats) -> Floats:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..keys.embedding import Embedding
+from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned
 from ..numerics.rotations import by_component
@@ -37,6 +37,8 @@ from .system import MovingSurface
 from .tangents import tangents_of
 
 ANCHOR_WEIGHT = 5e-5
+# What travels a hundredth of the size or more is not drawn to its line at all.
+_NO_LINE = (NEARLY_STILL / 1e-2) ** 2
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -73,6 +75,8 @@ class SurfacePath:
         Unwrapped rotations of the triangles of ``deformation``.
     whole_turn : (3,)
         Rotation vector of the motion of the whole, which is taken out of the keys; radians.
+    rest : (3,)
+        Rotation vector of what stays in place beside that motion; zero where nothing does.
     half_turned : (p,) int64
         Components that turn by about half a turn as one, which may as well go the other way round.
     """
@@ -91,7 +95,7 @@ class SurfacePath:
         self._apart = None
         if embedding.pair.nearly_coincident:
             self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
-        self._travel = key1 - self._key0
+        self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
         faces = self._group[embedding.pair.faces]
@@ -101,9 +105,14 @@ class SurfacePath:
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
         centres = self._key0[usable.faces].mean(axis=1)
-        turning = consistent_turning(usable.turns, face_adjacency(usable.faces), centres, usable.weights, held)
+        # What stays in place turns back beside a motion that was taken out.
+        self.rest = -embedding.motion.turn if still.any() else np.zeros(3)
+        neighbours = face_adjacency(usable.faces)
+        turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, self.rest)
+        returned = np.zeros(count, dtype=bool)
         if free_after_turns:
-            still[usable.faces[turning.angles > np.pi]] = False
+            returned[usable.faces[turning.angles_from(self.rest) > np.pi]] = True
+            still &= ~returned
         self.still = still[self._group]
         self._free = ~still
         self._springs = edges_without_triangle(triangles, self._group[embedding.pair.edges], self.deformation.faces)
@@ -113,7 +122,7 @@ class SurfacePath:
         owners = labels[usable.faces[:, 0]]
         flipped = np.zeros(0, dtype=np.int64) if other_way is None else other_way
         self.turning = turning.other_way(np.isin(owners, flipped))
-        self.half_turned = half_turned(self.turning, usable.weights, owners)
+        self.half_turned = half_turned(self.turning, usable.weights, owners, self.rest)
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
@@ -124,9 +133,18 @@ class SurfacePath:
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
+        # What hardly travels is drawn to its straight line, in the limit as if it were still.
+        travel = np.maximum(embedding.travel[self.vertices], STILL_TOLERANCE)
+        self._line_weights = np.where(returned, 0.0, np.maximum((NEARLY_STILL / travel) ** 2 - _NO_LINE, 0.0) ** 2)
         self._correction: EndCorrection | None = None
         self._surface = MovingSurface(
-            usable, self._springs, self._closed, (triangles, shares), self._free, self._key0, self._anchor_weights
+            usable,
+            self._springs,
+            self._closed,
+            (triangles, shares),
+            self._free,
+            self._key0,
+            self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
         self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
@@ -139,7 +157,8 @@ class SurfacePath:
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
         np.maximum.at(strongest, self._group, factors)
-        stronger._surface = self._surface.with_anchor_weights(self._anchor_weights * strongest)
+        stronger._anchor_weights = self._anchor_weights * strongest
+        stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
 
     def end_rates(self) -> tuple[Rates, Rates]:
@@ -219,8 +238,10 @@ class SurfacePath:
             turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
         tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
-        start = self._key0 + time * self._travel
-        start[self._free] = anchors[self._free]
+        lines = self._embedding.straight(time)[self.vertices]
+        share = (self._line_weights / (self._anchor_weights + self._line_weights))[:, None]
+        anchors = anchors + share * (lines - anchors)
+        start = np.where(self._free[:, None], anchors, lines)
         return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
 
 

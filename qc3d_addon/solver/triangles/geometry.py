@@ -66,11 +66,12 @@ def areas(positions: Floats, faces: Ints) -> Floats:
     return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
 
 
-def vertex_areas(points: Floats, faces: Ints) -> Floats:
+def vertex_areas(points: Floats, faces: Ints, shares: Floats | float = 1.0) -> Floats:
     """(n,) barycentric vertex areas: a third of the area of the triangles around each vertex.
 
+    What the triangles count is multiplied by ``shares`` (m,).
     At least a thousandth of the mean, so that every vertex has a positive weight; all 1 for a mesh without area.
     """
-    shares = sums_by_label(faces.ravel(), np.repeat(areas(points, faces) / 3.0, 3), len(points))
+    shares = sums_by_label(faces.ravel(), np.repeat(areas(points, faces) * shares / 3.0, 3), len(points))
     mean = float(shares.mean())
     return np.maximum(shares, 1e-3 * mean) if mean > 0.0 else np.ones(len(points))

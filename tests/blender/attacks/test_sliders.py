@@ -64,7 +64,9 @@ def test_what_is_no_number(baked: bpy.types.Object, state: State, tmp_path: Path
         assert str(caught.value).strip().startswith(f"Error: {NOT_A_NUMBER}"), name
         assert state() == before
     with pytest.raises(RuntimeError, match="is no longer a number"):
-        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", use_keyframes=True)
+        bpy.ops.qc3d.bake_inbetweens(
+            play_on="slider", from_key="Basis", to_key="Lean", mode="linear", use_keyframes=True
+        )
     assert NOT_A_NUMBER in drawn(baked).texts[0]
     # What does not need it works, and leaves it alone.
     assert bpy.ops.qc3d.export_alembic(filepath=str(tmp_path / "a.abc"), frames=2) == {"FINISHED"}

@@ -35,8 +35,8 @@ def test_a_bar_twisted_by_more_than_half_a_turn() -> None:
     angle = np.radians(220.0)
     embedding, fitter, path, done = followed(twisted(BAR, angle))
     mesh = fitter.mesh
-    # About 20 degrees a step.
-    assert 10 <= len(done) <= 20
+    # About 20 degrees a step; some of the turn is taken out of the whole.
+    assert 6 <= len(done) <= 12
     assert done == sorted(done)
     assert done[0] >= 0.0
     assert done[-1] <= 1.0
@@ -50,11 +50,12 @@ def test_a_bar_twisted_by_more_than_half_a_turn() -> None:
     rotations = polar_decomposition(mesh.jacobians(path.maps[-1])).rotation
     np.testing.assert_allclose(rotation_matrices(path.turns), rotations, rtol=0.0, atol=1e-12)
     # Inside the bar, near its twisted end, the tetrahedra know that they have turned the long way.
-    offsets = (mesh.centroids - 0.5) / embedding.scale
+    offsets = (mesh.centroids - 0.5) / embedding.scale @ embedding.axes
     top = (np.abs(offsets[:, :2]).max(axis=1) < 0.45) & (offsets[:, 2] > 0.8) & (offsets[:, 2] < 1.5)
     assert top.sum() >= 5
-    assert np.median(path.turns[top, 2]) > np.radians(180.0)
-    assert path.turns[top, 2].min() > np.radians(90.0)
+    turns = (path.turns[top] + embedding.motion.turn) @ embedding.axes[:, 2]
+    assert np.median(turns) > np.radians(180.0)
+    assert turns.min() > np.radians(90.0)
 
 
 def test_a_small_motion_takes_one_step() -> None:

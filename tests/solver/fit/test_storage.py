@@ -172,7 +172,7 @@ class TestWrongContents:
 
     def test_another_version(self) -> None:
         header = {**contents(STORED)["header"], "version": 99}
-        self.refused("has format 99, this version reads 2; fit the keys", header=header)
+        self.refused("has format 99, this version reads 3; fit the keys", header=header)
 
     @pytest.mark.parametrize(
         ("version", "said"),

@@ -84,7 +84,7 @@ class TestPreparedMap:
     def test_residual(self, fitted: FittedMap) -> None:
         embedding = fitted.embedding
         missed = np.linalg.norm(fitted.landmarks @ fitted.mapped - embedding.key1, axis=1)
-        missed /= np.linalg.norm(np.ptp(embedding.key0, axis=0))
+        missed /= embedding.scale * fitted.pair.diagonal
         residual = fitted.landmark_residual()
         assert residual.max == pytest.approx(missed.max(), rel=1e-9)
         assert residual.rms == pytest.approx(np.sqrt((embedding.weights * missed**2).sum()), rel=1e-9)

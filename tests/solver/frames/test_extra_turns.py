@@ -70,7 +70,7 @@ def test_everything_spins_as_one_where_nothing_is_still() -> None:
     embedding, spins = spun_between(points, turned(points, TURN, FAR) + 3.0, faces, 1)
     found = spins.apply(embedding.key0, 0.3)
     middle = embedding.weights @ embedding.key0
-    expected = turned(embedding.key0, 0.6 * np.pi * TURN / np.linalg.norm(TURN), middle)
+    expected = turned(embedding.key0, 0.6 * np.pi * embedding.axes @ TURN / np.linalg.norm(TURN), middle)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
 
 

@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
+from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.frames.easing import eased
 from qc3d_addon.solver.frames.preview import PreviewCurve
+from qc3d_addon.solver.frames.weights import Weights
 from qc3d_addon.solver.settings import Easing
 
 RANDOM = np.random.default_rng(0)
@@ -66,18 +70,19 @@ def test_easing_is_when_and_not_where(easing: Easing) -> None:
         np.testing.assert_array_equal(eased_curve.at(time), curve.at(passed))
 
 
+@pytest.mark.parametrize("kind", [Weights.hats, Weights.smooth])
 @given(st.integers(1, 30), st.floats(-0.5, 1.5))
-def test_beyond_the_straight_blend(steps: int, time: float) -> None:
+def test_beyond_what_weights_play(kind: Callable[[Floats], Weights], steps: int, time: float) -> None:
     curve = PreviewCurve(np.random.default_rng(steps).normal(size=(9, 4, 3)))
-    nodes = np.linspace(0.0, 1.0, steps + 1)
-    hats = np.maximum(0.0, 1.0 - np.abs(np.clip(time, 0.0, 1.0) * steps - np.arange(steps + 1)))
-    blend = np.tensordot(hats, np.stack([curve.at(node) for node in nodes]), axes=1)
-    np.testing.assert_allclose(curve.beyond_blend(time, steps), curve.at(time) - blend, atol=5e-5)
+    weights = kind(np.linspace(0.0, 1.0, steps + 1))
+    clamped = min(max(time, 0.0), 1.0)
+    played = weights.played(np.stack([curve.at(knot) for knot in weights.knots]), [clamped])[0]
+    np.testing.assert_allclose(curve.beyond(time, weights), curve.at(time) - played, atol=5e-5)
 
 
-def test_nothing_is_beyond_the_steps_themselves() -> None:
+def test_nothing_is_beyond_the_knots_themselves() -> None:
     curve = PreviewCurve(RANDOM.normal(size=(9, 4, 3)))
-    for step in range(8):
-        assert not curve.beyond_blend(step / 7, 7).any()
-    assert not curve.beyond_blend(1.0, 7).any()
-    assert curve.beyond_blend(0.5, 7).any()
+    weights = Weights.hats(np.linspace(0.0, 1.0, 8))
+    for knot in weights.knots.tolist():
+        assert np.abs(curve.beyond(knot, weights)).max() < 1e-6
+    assert curve.beyond(0.5, weights).any()

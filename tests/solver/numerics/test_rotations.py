@@ -128,10 +128,18 @@ class TestRotationVectors:
         assert_rotations(matrices)
         np.testing.assert_allclose(rotation_vectors(matrices), vectors, rtol=1e-12, atol=3e-16)
 
-    @pytest.mark.parametrize("below", [1e-4, 1e-7, 1e-10, 1e-13])
+    @pytest.mark.parametrize("below", [1e-4, 1e-5])
     def test_round_trip_just_below_half_a_turn(self, below: float) -> None:
         vectors = (np.pi - below) * random_rotations(50)[:, 0]
         np.testing.assert_allclose(rotation_vectors(rotation_matrices(vectors)), vectors, rtol=0.0, atol=1e-14)
+
+    @pytest.mark.parametrize("beside", [1e-7, 1e-10, 1e-13, 0.0, -1e-13, -1e-7])
+    def test_half_a_turn_always_goes_the_same_way(self, beside: float) -> None:
+        axes = random_rotations(50)[:, 0]
+        matrices = rotation_matrices((np.pi - beside) * axes)
+        found = rotation_vectors(matrices)
+        np.testing.assert_allclose(found, rotation_vectors(rotation_matrices((np.pi + beside) * axes)), atol=1e-6)
+        np.testing.assert_allclose(rotation_matrices(found), matrices, rtol=0.0, atol=EXACT)
 
     def test_half_a_turn_may_come_back_the_other_way_round(self) -> None:
         vectors = np.pi * np.concatenate([np.eye(3), -np.eye(3), random_rotations(50)[:, 0]])

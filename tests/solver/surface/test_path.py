@@ -83,7 +83,7 @@ class TestEveryPair:
     def test_still_vertices_stay_exactly(self, pair: tuple[Embedding, SurfacePath], time: float) -> None:
         embedding, path = pair
         still = embedding.still
-        np.testing.assert_array_equal(path.positions(time)[still], embedding.key0[still])
+        np.testing.assert_array_equal(path.positions(time)[still], embedding.straight(time)[still])
 
     def test_the_way_is_continuous(self, pair: tuple[Embedding, SurfacePath]) -> None:
         _, path = pair

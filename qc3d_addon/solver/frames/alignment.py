@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a frame stands: its calm parts beside the straight lines between the keys.
+
+Lengths, turns and volumes tell a frame's shape and leave its place to weak anchors, so that where nothing is still the
+whole frame would drift. It is carried rigidly to where the vertices that travel least go straight.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
+from ..numerics.rotations import rotation_matrices, rotation_vectors
+
+# Vertices that travel less than this part of all count most.
+_CALM_PERCENTILE = 25.0
+# Of the way: where a rigid motion of the whole leaves less than this, parts of it are calm to a lesser degree only; and
+# of that, what is left by rounding.
+_MOSTLY_RIGID, _EXACTLY_RIGID = 0.2, 1e-5
+# Steps of the alignment; frames are a few degrees away, and each step leaves the third power of the angle.
+_STEPS = 3
+# Of the moments of inertia: what lies in a line is not turned about it.
+_RIDGE = 1e-12
+# How fast the move sets in beside an inner key, where it must not change velocities.
+_ONSET = 4
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMove:
+    """The rigid motion x -> R (x - c) + c + d.
+
+    Parameters
+    ----------
+    turn : (3,)
+        Rotation vector of R, radians.
+    centre : (3,)
+        c.
+    shift : (3,)
+        d.
+    """
+
+    turn: Floats
+    centre: Floats
+    shift: Floats
+
+    @classmethod
+    def between(cls, shape: Floats, target: Floats, weights: Floats) -> RigidMove:
+        """Nearly the best rigid motion of the points ``shape`` (n, 3) onto ``target`` with weights (n,) of sum 1.
+
+        A few Gauss-Newton steps from rest: they find what is a few degrees away and, other than the best fit, change
+        gradually with the points, never by half a turn where the target is flattened or reversed.
+        """
+        centre, offsets = weights @ shape, target - shape
+        shift = weights @ offsets
+        # Differences, not positions, go into the moments: they are zero where the target is met, which counts most.
+        spread, missing = shape - centre, offsets - shift
+        turned, rotation = spread, np.eye(3)
+        floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
+        for _ in range(_STEPS):
+            levers = np.cross(turned[:, None], np.eye(3))
+            inertia = np.einsum("n,nia,nja->ij", weights, levers, levers) + floor * np.eye(3)
+            moment = weights @ np.cross(turned, missing - (turned - spread))
+            step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
+            turned, rotation = turned @ step.T, step @ rotation
+        return cls(rotation_vectors(rotation[None])[0], centre, shift)
+
+    def scaled(self, part: float) -> RigidMove:
+        """A part, 0..1, of the motion."""
+        return RigidMove(part * self.turn, self.centre, part * self.shift)
+
+    def apply(self, points: Floats) -> Floats:
+        """Points (k, 3), carried along."""
+        return np.asarray((points - self.centre) @ self._rotation.T + (self.centre + self.shift))
+
+    def undo_vectors(self, vectors: Floats) -> Floats:
+        """Displacements (k, 3), turned back."""
+        return np.asarray(vectors @ self._rotation)
+
+    @property
+    def _rotation(self) -> Floats:
+        return np.asarray(rotation_matrices(self.turn[None])[0])
+
+
+class CalmAlignment:
+    """Places the shapes of an embedded pair.
+
+    Parameters
+    ----------
+    embedding : Embedding
+    turns : bool
+        Whether there are full turns that the keys cannot tell: straight lines then tell nothing of the way, and nothing
+        is placed.
+    """
+
+    def __init__(self, embedding: Embedding, turns: bool = False) -> None:
+        self._embedding = embedding
+        self._inner = (False, False)
+        self._part = 0.0 if turns else _calm_part(embedding)
+        self._weights = _calm_weights(embedding.travel, embedding.weights)
+
+    def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
+        """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
+        other = copy.copy(self)
+        other._inner = inner
+        return other
+
+    def of(self, shape: Floats, time: float) -> RigidMove:
+        """Where to carry a shape (n, 3) at ``time``, cube units."""
+        if not self._part:
+            return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
+        whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
+        return whole.scaled(self._part * _onset(time, self._inner))
+
+
+def _calm_part(embedding: Embedding) -> float:
+    """How much of the alignment is due, 0..1: none where everything moves as one rigid body, which has no calm parts.
+
+    Such a body moves along its screw, whose points near the axis are no calmer than they have to be.
+    """
+    left = np.linalg.norm(embedding.key1 - embedding.key0, axis=1) / embedding.scale
+    way = np.linalg.norm(embedding.pair.key1 - embedding.pair.key0, axis=1)
+    squares = [float(embedding.weights @ distance**2) for distance in (left, way)]
+    share = min(float(np.sqrt(squares[0] / max(squares[1], 1e-300))) / _MOSTLY_RIGID, 1.0)
+    part = max(share - _EXACTLY_RIGID, 0.0) / (1.0 - _EXACTLY_RIGID)
+    return part * part * (3.0 - 2.0 * part)
+
+
+def _calm_weights(travel: Floats, areas: Floats) -> Floats:
+    """(n,) weights with sum 1: still vertices before all, then those that travel least.
+
+    Parameters
+    ----------
+    travel : (n,)
+        Distances between the keys over the size of the first.
+    areas : (n,)
+        Positive.
+    """
+    reach = float(np.percentile(travel, _CALM_PERCENTILE))
+    weights = np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2))
+    weights += (NEARLY_STILL / np.maximum(travel, STILL_TOLERANCE)) ** 4
+    weights *= areas
+    return np.asarray(weights / weights.sum())
+
+
+def _onset(time: float, inner: tuple[bool, bool]) -> float:
+    """The part of the move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
+    before = 1.0 - (1.0 - time) ** _ONSET if inner[0] else 1.0
+    after = 1.0 - time**_ONSET if inner[1] else 1.0
+    return before * after

@@ -24,6 +24,7 @@ from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
+from .mirror_image import MirrorImages
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -54,6 +55,7 @@ class NaturalFrames:
             turning = _turning_inside(fitted, self._surface)
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
+        self._mirror_images = MirrorImages(fitted.pair)
         self._slopes: tuple[Floats, Floats] | None = None
         self._alignment = CalmAlignment(embedding, turns)
         self._missed = [
@@ -170,15 +172,23 @@ class NaturalFrames:
         positions = self._fitted.embedding.from_cube(move.apply(shape), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
+        positions = self._mirror_images.averaged(positions)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
 
     def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
         return [
-            self._spins.apply(shape, time)
+            self._symmetric(self._spins.apply(shape, time), time)
             for (time, _), shape in zip(moments, surface.shapes(moments), strict=True)
         ]
+
+    def _symmetric(self, shape: Floats, time: float) -> Floats:
+        """Cube positions (n, 3) as symmetric as the keys."""
+        if not self._mirror_images:
+            return shape
+        embedding = self._fitted.embedding
+        return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time)), time)
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         few = batches(moments, surface.shapes_at_once)

@@ -55,23 +55,31 @@ class MirrorImages:
             if any(abs(normal @ plane.normal) > 1.0 - _SYMMETRIC for plane in self._planes):
                 continue
             images = np.concatenate([_reflected(key, normal, point) for key in keys], axis=1)
-            if tree.query(images[:_FIRST_LOOK])[0].max() > _SYMMETRIC * self._size:
+            if np.max(tree.query(images[:_FIRST_LOOK])[0]) > _SYMMETRIC * self._size:
                 continue
             distances, found = tree.query(images)
             partners: Ints = np.asarray(found, dtype=np.int64)
             numbers = np.arange(len(partners))
-            if distances.max() <= _SYMMETRIC * self._size and (partners[partners] == numbers).all():
+            if np.max(distances) <= _SYMMETRIC * self._size and (partners[partners] == numbers).all():
                 self._planes.append(_Plane(normal, point, partners))
 
     def __bool__(self) -> bool:
         return bool(self._planes)
 
+    def keep(self, halfway: Floats) -> None:
+        """Forget the planes about which the motion is not symmetric, by its shape (n, 3) halfway."""
+        shape = halfway[self._vertices]
+        self._planes = [
+            plane
+            for plane in self._planes
+            if np.linalg.norm(plane.image(shape) - shape, axis=1).max(initial=0.0) <= _ONE_SIDED * self._size
+        ]
+
     def averaged(self, shape: Floats) -> Floats:
         """A shape (n, 3) in the keys' coordinates, as symmetric as the keys."""
         for plane in self._planes:
             difference = plane.image(shape[self._vertices]) - shape[self._vertices]
-            if np.linalg.norm(difference, axis=1).max(initial=0.0) <= _ONE_SIDED * self._size:
-                shape = shape + 0.5 * difference[self._group]
+            shape = shape + 0.5 * difference[self._group]
         return shape
 
 

@@ -55,13 +55,17 @@ class NaturalFrames:
             turning = _turning_inside(fitted, self._surface)
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
-        self._mirror_images = MirrorImages(fitted.pair)
         self._slopes: tuple[Floats, Floats] | None = None
         self._alignment = CalmAlignment(embedding, turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
         ]
+        self._mirror_images = MirrorImages(fitted.pair)
+        if self._mirror_images:
+            moment = self._moments([self._volume.at(0.5)], [0.5])
+            halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
+            self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
 
     @property
     def still(self) -> Bools:
@@ -169,10 +173,9 @@ class NaturalFrames:
     def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
         """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._fitted.embedding.from_cube(move.apply(shape), time)
+        positions = self._mirror_images.averaged(self._fitted.embedding.from_cube(move.apply(shape), time))
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
-        positions = self._mirror_images.averaged(positions)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
         return positions
 

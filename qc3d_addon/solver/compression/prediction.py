@@ -44,7 +44,7 @@ class Predictor:
                 self._steps.append((wanted, *_neighbours(lattice, known, wanted)))
 
     def differences(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n, c) what is left of numbers (n, c) after the prediction, in the order of coding."""
+        """(n, c) residuals of numbers (n, c) after the prediction, in the order of coding."""
         left = numbers.copy()
         for wanted, neighbours, weights in self._steps:
             left[wanted] -= _predicted(numbers[neighbours], weights)

@@ -24,6 +24,7 @@ from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
+from .mirror_image import MirrorImages
 from .volume_path import VolumePath
 
 _UNCROSSING_ATTEMPTS = 3
@@ -60,6 +61,11 @@ class NaturalFrames:
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
         ]
+        self._mirror_images = MirrorImages(fitted.pair)
+        if self._mirror_images:
+            moment = self._moments([self._volume.at(0.5)], [0.5])
+            halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
+            self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
 
     @property
     def still(self) -> Bools:
@@ -167,7 +173,7 @@ class NaturalFrames:
     def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
         """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._fitted.embedding.from_cube(move.apply(shape), time)
+        positions = self._mirror_images.averaged(self._fitted.embedding.from_cube(move.apply(shape), time))
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -176,9 +182,16 @@ class NaturalFrames:
     def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
         return [
-            self._spins.apply(shape, time)
+            self._symmetric(self._spins.apply(shape, time), time)
             for (time, _), shape in zip(moments, surface.shapes(moments), strict=True)
         ]
+
+    def _symmetric(self, shape: Floats, time: float) -> Floats:
+        """Cube positions (n, 3) as symmetric as the keys."""
+        if not self._mirror_images:
+            return shape
+        embedding = self._fitted.embedding
+        return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time)), time)
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         few = batches(moments, surface.shapes_at_once)

@@ -99,7 +99,7 @@ def rotation_vectors(rotations: Floats) -> Floats:
 def _quaternions(rotations: Floats) -> Floats:
     """(k, 4) unit quaternions with scalar part first and >= 0; stable for every angle (Shepperd 1978).
 
-    Where the scalar part is zero up to rounding, the vector part points towards ``_HALF_TURN_SIDE``.
+    Where the scalar part is zero up to rounding, the vector part points toward ``_HALF_TURN_SIDE``.
     """
     diagonal = np.einsum("kii->ki", rotations)
     trace = diagonal.sum(axis=1)

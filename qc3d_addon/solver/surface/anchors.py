@@ -13,7 +13,7 @@ from ..numerics.screws import best_turns, translation_factors
 
 
 class ScrewAnchors:
-    """Each connected component moves along its own screw; what is left goes straight.
+    """Each connected component moves along its own screw motion; the remaining difference is interpolated linearly.
 
     A component with still vertices, or with fewer than three vertices, has no screw motion of its own.
 

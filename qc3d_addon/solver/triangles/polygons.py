@@ -105,7 +105,7 @@ def _loops(faces: Ints, label: Ints) -> tuple[Ints, Ints, Ints, Bools]:
 def labels_by_sides(faces: Ints, polygons: Ints) -> Ints:
     """(m,) which of the polygons (p, c), short ones filled up with -1, each triangle is part of; -1 where of none.
 
-    Told by the sides that a triangle shares with its polygon; a triangle that has none is told by its neighbors.
+    Determined by the sides that a triangle shares with its polygon; for a triangle without one, by its neighbors.
     """
     counts = (polygons >= 0).sum(axis=1)
     place = np.arange(polygons.shape[1])

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Symmetric frames of symmetric keys, whatever the triangulation and the samples of the volume."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Floats, Ints
+from ..keys.keypair import KeyPair
+
+# Of the diagonal: partners may be this far from the mirror image of a vertex.
+_SYMMETRIC = 1e-5
+# Of the diagonal: if a frame differs more from its mirror image, the motion itself is not symmetric, like that of
+# something that turns over.
+_ONE_SIDED = 0.05
+
+
+# Vertices that are looked at first: most planes are none of symmetry, which these few tell.
+_FIRST_LOOK = 20
+
+
+class _Plane(NamedTuple):
+    normal: Floats
+    point: Floats
+    partners: Ints
+
+    def image(self, shape: Floats) -> Floats:
+        """(n, 3) the mirror image of a shape (n, 3): at each vertex, the image of its partner."""
+        return _reflected(shape, self.normal, self.point)[self.partners]
+
+
+class MirrorImages:
+    """Averages shapes with their mirror images across the planes about which both keys are symmetric.
+
+    Parameters
+    ----------
+    pair : KeyPair
+    """
+
+    def __init__(self, pair: KeyPair) -> None:
+        self._vertices, self._group = pair.welding
+        self._size = pair.diagonal
+        keys = (pair.key0[self._vertices], pair.key1[self._vertices])
+        both = np.concatenate(keys)
+        point = both.mean(axis=0)
+        spread = (both - point) / self._size
+        normals = np.concatenate([np.linalg.eigh(spread.T @ spread)[1].T, np.eye(3)])
+        tree = cKDTree(np.concatenate(keys, axis=1))
+        self._planes: list[_Plane] = []
+        for normal in normals:
+            if any(abs(normal @ plane.normal) > 1.0 - _SYMMETRIC for plane in self._planes):
+                continue
+            images = np.concatenate([_reflected(key, normal, point) for key in keys], axis=1)
+            if np.max(tree.query(images[:_FIRST_LOOK])[0]) > _SYMMETRIC * self._size:
+                continue
+            distances, found = tree.query(images)
+            partners: Ints = np.asarray(found, dtype=np.int64)
+            numbers = np.arange(len(partners))
+            if np.max(distances) <= _SYMMETRIC * self._size and (partners[partners] == numbers).all():
+                self._planes.append(_Plane(normal, point, partners))
+
+    def __bool__(self) -> bool:
+        return bool(self._planes)
+
+    def keep(self, halfway: Floats) -> None:
+        """Forget the planes about which the motion is not symmetric, by its shape (n, 3) halfway."""
+        shape = halfway[self._vertices]
+        self._planes = [
+            plane
+            for plane in self._planes
+            if np.linalg.norm(plane.image(shape) - shape, axis=1).max(initial=0.0) <= _ONE_SIDED * self._size
+        ]
+
+    def averaged(self, shape: Floats) -> Floats:
+        """A shape (n, 3) in the keys' coordinates, as symmetric as the keys."""
+        for plane in self._planes:
+            difference = plane.image(shape[self._vertices]) - shape[self._vertices]
+            shape = shape + 0.5 * difference[self._group]
+        return shape
+
+
+def _reflected(points: Floats, normal: Floats, point: Floats) -> Floats:
+    return np.asarray(points - 2.0 * np.outer((points - point) @ normal, normal))

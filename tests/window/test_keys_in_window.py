@@ -97,5 +97,5 @@ def test_escape_stops_all_of_them(rigged: Window) -> None:
     rigged.hover_sidebar()
     rigged.press("Escape")
     rigged.wait_for("job() is None")
-    rigged.wait_for("'Bake Keys was cancelled; nothing was changed.' in reports()")
+    rigged.wait_for("'Bake Keys was canceled; nothing was changed.' in reports()")
     assert rigged.ask("state()") == before

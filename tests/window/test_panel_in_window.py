@@ -55,7 +55,7 @@ def test_escape_is_for_the_progress_only_with_the_mouse_over_it(window: Window, 
             time.sleep(0.3)
         window.press("Escape")
         window.wait_for("job() is None")
-    window.wait_for("'Bake In-Betweens was cancelled; nothing was changed.' in reports()")
+    window.wait_for("'Bake In-Betweens was canceled; nothing was changed.' in reports()")
 
 
 def test_the_list_and_before_and_after(window: Window, tmp_path: Path) -> None:

@@ -13,7 +13,12 @@ from . import choices, cli, compat, live_scrub, preferences, properties
 from .bake import jobs
 from .heat_map import legend
 from .keys import straight
-from .operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects, QC3D_OT_rebake
+from .operators.bake_inbetweens import (
+    QC3D_OT_add_here,
+    QC3D_OT_bake_inbetweens,
+    QC3D_OT_bake_objects,
+    QC3D_OT_rebake,
+)
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
@@ -47,6 +52,7 @@ CLASSES = (
     QC3D_OT_bake_objects,
     QC3D_OT_split_key,
     QC3D_OT_rebake,
+    QC3D_OT_add_here,
     QC3D_OT_cancel,
     QC3D_OT_heat_map,
     QC3D_OT_select_worst,

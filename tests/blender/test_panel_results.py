@@ -113,6 +113,7 @@ def test_a_bake(even: bpy.types.Object) -> None:
         "rebake",
         "live_scrub",
         "straight",
+        "add_here",
         "select_worst",
         "heat_map",
         "mirror",

@@ -111,12 +111,13 @@ def test_mutes_of_the_user_stay(figure: bpy.types.Object) -> None:
         assert bpy.ops.qc3d.straight() == {"FINISHED"}
         assert blocks["Lean_to_Stretch_50"].mute
     bake(figure, "Basis", "Lean", play_on="key")
-    keys = figure.data.shape_keys
-    driver = keys.animation_data.drivers.find('key_blocks["Lean_50"].mute')
-    driver.mute = True
-    for _ in range(2):
+    driver = figure.data.shape_keys.driver_add('key_blocks["Lean_50"].mute')
+    for own in (True, False):
+        driver.mute = own
         assert bpy.ops.qc3d.straight() == {"FINISHED"}
-        assert driver.mute
+        assert driver.mute  # else it would switch the in-between on again
+        assert bpy.ops.qc3d.straight() == {"FINISHED"}
+        assert driver.mute == own
 
 
 def test_a_saved_file_is_as_without_it(figure: bpy.types.Object, tmp_path: Path) -> None:

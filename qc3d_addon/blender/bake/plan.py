@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from ...solver.settings import FitOptions
 
 
+_DIGITS = 4  # of places that the user sets by hand
+_LEAST_APART = 0.01  # of two in-betweens, one of which the user asks for
+
+
 @dataclass(frozen=True)
 class Plan:
     """What to compute for an object, and how to find the object again.
@@ -157,6 +161,27 @@ def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
     if problem is not None:
         raise InputError(problem)
     return BakeRequest.again(chain.through, chain.request)
+
+
+def plan_one_more(obj: bpy.types.Object | None, chain: Chain) -> Plan:
+    """Plan a chain again with one more in-between, where its control is now; later bakes of it have it too.
+
+    Raises
+    ------
+    InputError
+        If the object or the keys cannot be used, or the control is not between two in-betweens.
+    """
+    request = request_again(obj, chain)
+    control = chain_keys.control_of(checks.require_object(obj), chain)
+    control.require()
+    place = round(control.value, _DIGITS)
+    if not 0.0 < place < 1.0:
+        raise InputError(f"'{control.name}' is at {place:.2f}; set it between 0 and 1, where the in-between is to be.")
+    nearest = min(chain.places, key=lambda known: abs(known - place))
+    if abs(nearest - place) < _LEAST_APART:
+        what = "an end" if nearest in (0.0, 1.0) else "an in-between"
+        raise InputError(f"'{control.name}' is at {place:.3f}, and there is {what} at {nearest:.3f}; set it elsewhere.")
+    return plan_bake(obj, replace(request, also_at=(*request.also_at, place)))
 
 
 def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:

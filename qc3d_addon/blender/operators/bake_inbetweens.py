@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
-from ..bake.plan import Plan, plan_bake, request_again, write_bake
+from ..bake.plan import Plan, plan_bake, plan_one_more, request_again, write_bake
 from ..bake.together import objects_with_keys, plan_together, write_together
 from ..choices import BakeChoices
 from ..kinds import present
@@ -61,6 +61,29 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         obj = context.active_object
         chain = chosen_chain(obj, self.slider)
         return plan_bake(obj, request_again(obj, chain))
+
+    def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        end_previews()
+        result = write_bake(plan, outcome)
+        show_newest(plan.locate())
+        return [*result.notes, result.summary()]
+
+
+class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
+    """Bake again with one more in-between, at the value that the slider or key has now"""
+
+    bl_idname = "qc3d.add_here"
+    bl_label = "Add Here"
+
+    slider: SLIDER
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_chains(cls, context)
+
+    def plan(self, context: bpy.types.Context) -> Plan:
+        obj = context.active_object
+        return plan_one_more(obj, chosen_chain(obj, self.slider))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
         end_previews()

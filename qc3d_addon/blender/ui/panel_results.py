@@ -15,7 +15,7 @@ from ..heat_map import heat_map
 from ..keys import chain_keys, straight
 from ..keys.double_motion import double_motion
 from ..kinds import keys_of, present, shape_keys_of
-from ..operators.bake_inbetweens import QC3D_OT_rebake
+from ..operators.bake_inbetweens import QC3D_OT_add_here, QC3D_OT_rebake
 from ..operators.chains import (
     QC3D_OT_absolute_keys,
     QC3D_OT_export_alembic,
@@ -109,7 +109,10 @@ def _draw_chain(
         is_on = live_scrub.is_on(obj, chain.slider)
         buttons.operator(QC3D_OT_live_scrub.bl_idname, icon='PLAY', depress=is_on).slider = chain.slider
     is_straight = straight.is_on(keys_of(obj), chain)
+    buttons = layout.row(align=True)
     buttons.operator(QC3D_OT_straight.bl_idname, icon='IPO_LINEAR', depress=is_straight).slider = chain.slider
+    if not chain.mirror_of:
+        buttons.operator(QC3D_OT_add_here.bl_idname, icon='ADD').slider = chain.slider
     if problem is not None and not chain.mirror_of:
         draw_sentence(context, layout, problem, 'ERROR')
     if chain.result is not None:

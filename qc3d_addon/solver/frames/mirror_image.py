@@ -21,6 +21,8 @@ _ONE_SIDED = 0.05
 
 # Vertices that are looked at first: most planes are none of symmetry, which these few tell.
 _FIRST_LOOK = 20
+# So many vertices are tried, each with so many partners.
+_TRIED = 24
 
 
 class _Plane(NamedTuple):
@@ -47,8 +49,7 @@ class MirrorImages:
         keys = (pair.key0[self._vertices], pair.key1[self._vertices])
         both = np.concatenate(keys)
         point = both.mean(axis=0)
-        spread = (both - point) / self._size
-        normals = np.concatenate([np.linalg.eigh(spread.T @ spread)[1].T, np.eye(3)])
+        normals = _candidates([key - point for key in keys], _SYMMETRIC * self._size)
         tree = cKDTree(np.concatenate(keys, axis=1))
         self._planes: list[_Plane] = []
         for normal in normals:
@@ -81,6 +82,19 @@ class MirrorImages:
             difference = plane.image(shape[self._vertices]) - shape[self._vertices]
             shape = shape + 0.5 * difference[self._group]
         return shape
+
+
+def _candidates(keys: list[Floats], reach: float) -> Floats:
+    """(k, 3) normals of planes through the origin that may mirror both keys (n, 3): those of some vertices."""
+    far = [np.linalg.norm(key, axis=1) for key in keys]
+    found = []
+    for vertex in np.unique(np.linspace(0, len(keys[0]) - 1, _TRIED, dtype=np.int64)).tolist():
+        alike = np.logical_and.reduce([np.abs(distance - distance[vertex]) <= reach for distance in far])
+        between = keys[0][alike] - keys[0][vertex]
+        length = np.linalg.norm(between, axis=1)
+        apart = length > 1e2 * reach
+        found.append((between[apart] / length[apart, None])[:_TRIED])
+    return np.concatenate(found)
 
 
 def _reflected(points: Floats, normal: Floats, point: Floats) -> Floats:

@@ -83,7 +83,7 @@ def test_sliders_and_before_and_after_in_pose_mode(window: Window, tmp_path: Pat
     assert window.ask("bpy.context.view_layer.objects.active.mode") == "POSE"
 
 
-@pytest.mark.parametrize("words", ["in-between", "breakdown", "tween"])
+@pytest.mark.parametrize("words", ["in-between", "breakdown bake", "tween"])
 def test_search_finds_it(window: Window, words: str) -> None:
     window.ask("arm().qc3d.quality = 'finest'")
     window.move(200, 300)

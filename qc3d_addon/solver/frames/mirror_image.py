@@ -17,8 +17,6 @@ _SYMMETRIC = 1e-5
 # Of the diagonal: if a frame differs more from its mirror image, the motion itself is not symmetric, like that of
 # something that turns over.
 _ONE_SIDED = 0.05
-
-
 # Vertices that are looked at first: most planes are none of symmetry, which these few tell.
 _FIRST_LOOK = 20
 # So many vertices are tried, each with so many partners.
@@ -46,6 +44,7 @@ class MirrorImages:
     def __init__(self, pair: KeyPair) -> None:
         self._vertices, self._group = pair.welding
         self._size = pair.diagonal
+        self._keys = (pair.key0, pair.key1)
         keys = (pair.key0[self._vertices], pair.key1[self._vertices])
         both = np.concatenate(keys)
         point = both.mean(axis=0)
@@ -76,8 +75,14 @@ class MirrorImages:
             if np.linalg.norm(plane.image(shape) - shape, axis=1).max(initial=0.0) <= _ONE_SIDED * self._size
         ]
 
-    def averaged(self, shape: Floats) -> Floats:
-        """A shape (n, 3) in the keys' coordinates, as symmetric as the keys."""
+    def averaged(self, shape: Floats, time: float) -> Floats:
+        """A shape (n, 3) at ``time`` in the keys' coordinates, as symmetric as the keys: their own asymmetry stays."""
+        if not self._planes:
+            return shape
+        own = [key - self._symmetric(key) for key in self._keys]
+        return self._symmetric(shape) + ((1.0 - time) * own[0] + time * own[1])
+
+    def _symmetric(self, shape: Floats) -> Floats:
         for plane in self._planes:
             difference = plane.image(shape[self._vertices]) - shape[self._vertices]
             shape = shape + 0.5 * difference[self._group]

@@ -173,7 +173,7 @@ class NaturalFrames:
     def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
         """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
         pair, still = self._fitted.pair, self.still
-        positions = self._mirror_images.averaged(self._fitted.embedding.from_cube(move.apply(shape), time))
+        positions = self._mirror_images.averaged(self._fitted.embedding.from_cube(move.apply(shape), time), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
         positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
@@ -191,7 +191,7 @@ class NaturalFrames:
         if not self._mirror_images:
             return shape
         embedding = self._fitted.embedding
-        return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time)), time)
+        return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time), time), time)
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         few = batches(moments, surface.shapes_at_once)

@@ -63,7 +63,7 @@ class LengthsFirst:
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
-        part = _MOST_EXCESS / np.maximum(added, _MOST_EXCESS)
+        part = _allowed(added)
         return np.asarray(free + part[self._labels][:, None] * (held - free))
 
     def straightened(self, shape: Floats, time: float) -> Floats:
@@ -75,7 +75,7 @@ class LengthsFirst:
         if not self._can_go_straight.any():
             return shape
         straight = (1.0 - time) * self._key0 + time * self._key1
-        need = 1.0 - _MOST_EXCESS / np.maximum(self._excess(shape), _MOST_EXCESS)
+        need = 1.0 - _allowed(self._excess(shape))
         part = need * self._can_go_straight
         return np.asarray(shape + part[self._labels][:, None] * (straight - shape))
 
@@ -94,6 +94,12 @@ class LengthsFirst:
         return np.asarray(
             np.maximum(np.maximum(length / self._longest, 2.0 - length / self._shortest) - 1.0, 0.0)
         )
+
+
+def _allowed(excess: Floats) -> Floats:
+    """(c,) the part, 0..1, by which an excess is reduced to about the largest; without a corner where that sets in."""
+    beyond = np.maximum(excess / _MOST_EXCESS - 1.0, 0.0)
+    return np.asarray(1.0 / (1.0 + beyond**2 / (1.0 + beyond)))
 
 
 def _lengths(shape: Floats, edges: Ints) -> Floats:

@@ -19,10 +19,11 @@ from ..numerics.rotations import rotation_vectors
 from ..numerics.symmetric_matrices import Stretch
 from .geometry import face_normals, hat_gradients, planar_jacobians, tangent_bases
 
-# Below these areas a triangle has no usable directions in floating point: relative to the largest area of the mesh, and
-# relative to the longest edge times the largest coordinate, where the area may be nothing but rounding.
+# Triangles whose area is less than this part of the largest have no usable directions in floating point. Nor do those
+# whose height may be rounding alone: a few steps of single precision, in which Blender has its coordinates, at the
+# largest coordinate. Three vertices in a line, as in a polygon with subdivided sides, make such triangles.
 _THINNEST = 1e-10
-_ROUNDING = 1e-13
+_ROUNDING = 2.5e-7
 
 
 @dataclass(frozen=True, eq=False)

@@ -212,3 +212,16 @@ class TestTheTrueWayRound:
         halfway = np.einsum("nij,nj->ni", rotation_matrices(0.5 * turns), bar)
         ends = np.isin(bar[:, 2], [0.0, 5.0])
         assert np.abs(shape - halfway)[ends].max() < 0.3
+
+
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.3, -0.5, 1.1]])
+def test_vertices_in_a_line_do_not_keep_the_path_from_its_keys(turn: list[float]) -> None:
+    # Triangles of three vertices in a line, which single precision gives an area of rounding and any direction.
+    ends = {tuple(sorted(edge)) for a, b, c in FACES.tolist() for edge in ((a, b), (b, c), (c, a))}
+    edges = np.array(sorted(ends))
+    points = turned(np.concatenate([BAR, BAR[edges].mean(axis=1)]), turn).astype(np.float32).astype(np.float64)
+    slivers = np.column_stack([edges[:, 0], len(BAR) + np.arange(len(edges)), edges[:, 1]])
+    key1 = points + np.maximum(points[:, 2:], 0.0) ** 2 * [0.4, 0.1, -0.1]
+    embedding, path = path_of(points, key1.astype(np.float32).astype(np.float64), np.concatenate([FACES, slivers]))
+    for time, key in ((1e-6, embedding.key0), (1.0 - 1e-6, embedding.key1)):
+        assert np.abs(path.positions(time) - key).max() < 1e-5

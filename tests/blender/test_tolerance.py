@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("work_here")
 
 @pytest.fixture
 def bar() -> bpy.types.Object:
-    """The active object "Bar": a box of height 4 whose upper half bends by 60 degrees."""
+    """The active object "Bar": a box of height 4 whose upper half bends by 40 degrees."""
     bpy.ops.mesh.primitive_cylinder_add(vertices=8, radius=0.4, depth=4.0)
     obj = bpy.context.active_object
     obj.name = "Bar"
@@ -34,7 +34,7 @@ def bar() -> bpy.types.Object:
     bent = obj.shape_key_add(name="Bent", from_mix=False)
     bent.value = 0.0
     for point in bent.points:
-        angle = np.radians(60.0) * np.clip(point.co.z / 2.0, 0.0, 1.0)
+        angle = np.radians(40.0) * np.clip(point.co.z / 2.0, 0.0, 1.0)
         height = max(point.co.z, 0.0)
         x, low = point.co.x, min(point.co.z, 0.0)
         point.co.x = x * np.cos(angle) + height * np.sin(angle) * 0.8

@@ -163,7 +163,8 @@ def test_where_hang_ups_are_ignored_it_works_on(here: Path, temporary: Path) -> 
         "from qc3d_addon.start", "os.kill(os.getpid(), signal.SIGHUP)\nfrom qc3d_addon.start"
     )
     strike = "\nfrom qc3d_addon.cli import interpolate as command\nread = command.read_pairs\n"
-    strike += "command.read_pairs = lambda *all: (os.kill(os.getpid(), signal.SIGHUP), read(*all))[1]\n"
+    strike += "def hung_up(*all, **named):\n    os.kill(os.getpid(), signal.SIGHUP)\n    return read(*all, **named)\n"
+    strike += "command.read_pairs = hung_up\n"
     program = program.replace("from qc3d_addon.start", f"{strike}from qc3d_addon.start")
     arguments = [*INTERPOLATE, "--mode", "straight"]
     done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=PATIENCE)

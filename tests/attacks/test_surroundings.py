@@ -22,6 +22,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="closes streams and sets
 
 PROGRAM = [sys.executable, "-m", "qc3d_addon"]
 INTERPOLATE = ["interpolate", "bar.npz", *KEYS, "--frames", "0", *QUICK, "--output", "new.npz"]
+NATURAL = ["interpolate", "bar.npz", *KEYS, "--output", "new.npz"]
 COMPRESS = ["compress", "map.npz", "--modes", "3", "--scheme", "published", "--output", "new.qc3d"]
 
 
@@ -156,7 +157,7 @@ class TestLimits:
             "def none(self): raise RuntimeError(\"can't start new thread\")\n"
             "threading.Thread.start = none"
         )
-        status, said = limited(lines, [*INTERPOLATE, "--mode", "natural", "--engine", "delaunay", "--frames", "9"])
+        status, said = limited(lines, [*NATURAL, "--engine", "delaunay", "--frames", "9"])
         assert status == 2
         assert said == "qc3d: The system allows no more threads; close some programs, or raise the limit (ulimit -u)."
 
@@ -167,7 +168,7 @@ class TestLimits:
             "def none(*_, **__): raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))\n"
             "subprocess.Popen = none"
         )
-        arguments = [*INTERPOLATE, "--mode", "natural", "--frames", "1", "--quality", "normal"]
+        arguments = [*NATURAL, "--frames", "1", "--quality", "normal"]
         status, said = limited(lines, [*arguments, "--engine", "tetwild"])
         assert status == 2
         assert is_sentence(said)

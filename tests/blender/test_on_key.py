@@ -298,3 +298,11 @@ def test_drivers_move_values_only_and_need_no_scripts(figure: bpy.types.Object) 
     assert len(made) == 3
     assert all(curve.data_path.endswith("].value") for curve in made)
     assert all(curve.driver.is_simple_expression for curve in made)
+
+
+def test_a_bake_with_other_places_knows_the_keys_of_the_one_before(figure: bpy.types.Object) -> None:
+    for count in (1, 2, 3):
+        bake(count=count)
+        result = chain_of(figure).result
+        assert result is not None
+        assert not [note for note in result.notes if "without a record" in note]

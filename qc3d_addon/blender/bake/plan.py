@@ -242,6 +242,8 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     sculpted = Sculpted.of(obj, chain)
     sculpted.require_among(steps.places)
     shapes, made, kept = sculpted.kept(steps.places, shapes)
+    # Looked for while the chain still has the steps of its earlier bake.
+    unknown = [*unknown_inbetweens(keys, chain, record.chains)] if chain.on_key else []
 
     with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
         control = chain_keys.control_of(obj, chain)
@@ -249,7 +251,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         notes = [*plan.notes, *bake.report.notes, *said, *kept]
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
         notes += double_motion(obj, chain, record.chains)
-        notes += unknown_inbetweens(keys, chain, record.chains) if chain.on_key else []
+        notes += unknown
         if obj.show_only_shape_key:
             notes.append(f"'{obj.name}' shows only its active key; unpin it to see the in-betweens play.")
         report = {

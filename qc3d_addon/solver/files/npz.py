@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import math
 import stat
@@ -28,6 +29,7 @@ _UNREADABLE = (
     OSError, ValueError, EOFError, MemoryError, OverflowError, RuntimeError, LookupError, TypeError, AttributeError,
     SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
+codecs.lookup("cp437")  # of names in archives: loaded now, since Python calls it unknown when no file can be opened
 MOST_BYTES = 2**31  # limit for a file, for an array in it, and for all arrays that are read together
 _MOST_DIRECTORY = 2**22  # bytes of an archive's directory, which takes about ten times as much when parsed
 _MOST_HEADER = 2**14  # bytes of an array's header; numpy itself reads at most 10,000

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, with_remedy
 from ..files.atomic import replacing
 from ..files.npz import open_archive, require_file, write_arrays
 from ..files.private_folders import PrivateFolder
@@ -191,7 +191,10 @@ def require_format(path: Path) -> None:
     one = TetFile(corners, np.array([[0, 1, 2, 3]]), {TARGET: 2.0 * corners}, {STRETCH: np.ones((1, 6))})
     with PrivateFolder(path.parent) as folder:  # beside the output, where it must be possible to write anyway
         trial = folder / f"trial{path.suffix}"
-        put_tets(trial, one, path)
+        try:
+            put_tets(trial, one, path)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written: {with_remedy(error)}.") from error
         try:
             back = read_tets(trial)
             is_held = np.array_equal(back.at_vertices[TARGET], one.at_vertices[TARGET])

@@ -120,7 +120,7 @@ def test_blender_is_ended_while_it_bakes(
     with blender(path, "quick", temporary, repository) as process:
         assert process.wait() == 0
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert len(bpy.data.objects["Figure"].data.shape_keys.key_blocks) == 7
+    assert len(bpy.data.objects["Figure"].data.shape_keys.key_blocks) == 9
     assert left_in(temporary) == []
 
 

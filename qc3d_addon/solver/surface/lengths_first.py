@@ -97,8 +97,9 @@ class LengthsFirst:
 
 
 def _allowed(excess: Floats) -> Floats:
-    """(c,) the part, 0..1, by which an excess is reduced to about the largest; without a corner where that sets in."""
-    beyond = np.maximum(excess / _MOST_EXCESS - 1.0, 0.0)
+    """(c,) the part, 0..1, by which an excess stays below the largest; without a corner where that sets in."""
+    # The reduced excess is at most 4/3 of where the reduction sets in.
+    beyond = np.maximum(excess / (0.75 * _MOST_EXCESS) - 1.0, 0.0)
     return np.asarray(1.0 / (1.0 + beyond**2 / (1.0 + beyond)))
 
 

@@ -134,6 +134,8 @@ class FoldFreeFitter:
         size = len(free)
         operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
         smoother = LinearOperator((size, size), matvec=precondition, dtype=np.float64)
+        # Every iterate of CG that starts at zero is a descent direction, also the one at which the iterations run out
+        # (inexact Newton; Nocedal & Wright 2006, section 7.1). The line search judges it, so the status is not needed.
         step, _ = cg(operator, -gradient.ravel(), rtol=_CG_TOLERANCE, maxiter=_CG_ITERATIONS, M=smoother)
         return np.asarray(step).reshape(-1, 3)
 

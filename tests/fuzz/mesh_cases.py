@@ -97,14 +97,14 @@ def coarser() -> None:
 def _require_sound(outcome: Outcome, task: Task) -> None:
     bake, pairs = outcome.bake, list(task.pairs.values())
     assert isinstance(bake, Bake)
-    assert bake.frames.shape == (len(task.times), *pairs[0].key0.shape), "frames of another shape"
+    assert bake.frames.shape == (len(task.times), *pairs[0].own.key0.shape), "frames of another shape"
     assert np.isfinite(bake.frames).all(), "positions that are not finite"
     along = [task.pairs[ends] for ends in pairwise(task.through)]
     for time, frame in zip(task.times, bake.frames, strict=True):
         if time == 0.0:
-            assert np.array_equal(frame, along[0].key0), "the first key is missed"
+            assert np.array_equal(frame, along[0].own.key0), "the first key is missed"
         if time == 1.0:
-            assert np.array_equal(frame, along[-1].key1), "the last key is missed"
+            assert np.array_equal(frame, along[-1].own.key1), "the last key is missed"
     for values in bake.measures.values():
         assert np.isfinite(values).all(), "measures that are not finite"
     json.dumps(bake.report.as_json(), allow_nan=False)

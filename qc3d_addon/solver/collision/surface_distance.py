@@ -15,6 +15,7 @@ from ..triangles.topology import sides, welded
 from .box_tree import halving_order
 
 _FAN = 4  # children of each node of the tree: with fewer, numpy is called on too many levels
+_SURELY = 1.0 - 1e-9  # factor below which a bound is smaller whatever its rounding
 _BLOCK = 1_000  # queries processed at once: their temporary arrays stay in the processor's cache
 
 
@@ -103,7 +104,8 @@ class SurfaceDistance:
             nearer, farther = level.bounds(places[:, query], node)
             firsts = np.flatnonzero(np.diff(query, prepend=-1))
             farthest = np.minimum(farthest, np.minimum.reduceat(farther, firsts))
-            kept = nearer <= farthest[query]
+            # Of queries very far away, bounds are equal up to rounding, or not numbers: these rule out nothing.
+            kept = ~(_SURELY * nearer > farthest[query])
             query, node = query[kept], node[kept]
         corners = self._points[self._faces[node]]
         weights = _closest_weights(queries[query], corners)

@@ -173,10 +173,12 @@ def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
     joinable = np.ones(len(quads), dtype=bool)
     squares = np.zeros(len(quads))
     for key in keys:
-        size = max(float(np.ptp(key, axis=0).max(initial=0.0)), 1e-300)
-        scaled = (key - key.min(axis=0, initial=0.0)) / size
-        joinable &= _flat_and_convex(scaled, quads)
-        squares += ((scaled[quads[:, 2]] - scaled[quads[:, 0]]) ** 2).sum(axis=1)
+        # Sizes near the ends of the range of floating point give infinities, which are not flat.
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = max(float(np.ptp(key, axis=0).max(initial=0.0)), 1e-300)
+            scaled = (key - key[:1]) / size
+            joinable &= _flat_and_convex(scaled, quads)
+            squares += ((scaled[quads[:, 2]] - scaled[quads[:, 0]]) ** 2).sum(axis=1)
     first, second, squares = first[joinable] % len(faces), second[joinable] % len(faces), squares[joinable]
     longest, times = np.zeros(len(faces)), np.zeros(len(faces), dtype=np.int64)
     for side in (first, second):

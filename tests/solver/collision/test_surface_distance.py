@@ -98,3 +98,17 @@ def test_the_side_is_right_beyond_sharp_edges(sharpness: float) -> None:
     random = np.random.default_rng(2)
     beyond = np.column_stack([-random.uniform(0.01, 1.0, 200), random.uniform(0, 1, 200), random.normal(size=200)])
     assert (SurfaceDistance(points, faces).nearest(beyond)[0] > 0.0).all()
+
+
+@pytest.mark.parametrize("far", [1e6, 1e20, 1e200])
+def test_from_very_far_away(far: float) -> None:
+    ball, faces = icosphere(3)
+    directions = np.random.default_rng(3).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    with np.errstate(all="ignore"):
+        distance, _, _ = SurfaceDistance(ball, faces).nearest(far * directions)
+    assert distance.shape == (200,)
+    if far < 1e100:  # beyond that, its square is not a number
+        np.testing.assert_allclose(np.abs(distance), far, rtol=1e-5)
+    if far < 1e10:  # beyond that, the ball is a point to double precision, which has no side
+        assert (distance > 0.0).all()

@@ -134,3 +134,11 @@ class TestLabelsBySides:
 def zigzag(loop: Ints) -> Ints:
     """Triangles of an octagon of which one has no side of it."""
     return loop[np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6], [6, 7, 0], [0, 2, 4], [4, 6, 0]])]
+
+
+@pytest.mark.parametrize("size", [1e-310, 1e-200, 1e200, 1e307])
+def test_sizes_near_the_ends_of_floating_point(size: float) -> None:
+    square = size * np.array([[2.0, 2.0, 1.0], [3.0, 2.0, 1.0], [3.0, 3.0, 1.0], [2.0, 3.0, 1.0]])
+    with np.errstate(all="raise", under="ignore"):
+        found = flat_quads([square, square], np.array([[0, 1, 2], [0, 2, 3]]))
+    assert len(found) == 2

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 
 from ..errors import InputError
 from ..settings import Quality
@@ -133,6 +134,11 @@ def machine_limit_mb() -> int:
 
 def peak_memory_mb() -> float | None:
     """Peak resident memory of this process in megabytes; None on Windows, which does not tell."""
+    try:  # Linux counts in ``ru_maxrss`` what the process was forked from, such as a large Blender
+        lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
+        return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 2**10
+    except (OSError, StopIteration, ValueError, IndexError):
+        pass
     try:
         import resource
     except ImportError:

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -117,3 +119,12 @@ def test_the_machines_limit_is_less_than_its_memory() -> None:
     with open("/proc/meminfo") as file:
         total = int(file.readline().split()[1]) / 1024
     assert 0.5 * total < machine_limit_mb() < total
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells it there")
+def test_the_peak_is_that_of_this_process_alone() -> None:
+    held = np.ones(50_000_000)  # 400 MB, which a child would be counted with
+    code = "from qc3d_addon.solver.support.memory import peak_memory_mb; print(peak_memory_mb())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert held[-1] == 1.0
+    assert 5.0 < float(done.stdout) < 300.0

@@ -155,7 +155,8 @@ class TestRotationVectors:
         np.testing.assert_array_equal(rotation_vectors(np.eye(3)[None]), np.zeros((1, 3)))
         np.testing.assert_array_equal(rotation_matrices(np.zeros((1, 3))), np.eye(3)[None])
 
-    @given(units, st.floats(0.0, np.pi - 1e-9))
+    # Closer to a half turn, one of its two axes is chosen whatever the rounding.
+    @given(units, st.floats(0.0, np.pi - 1e-5))
     def test_round_trip_of_anything(self, axis: Floats, angle: float) -> None:
         vector = angle * axis[None]
         np.testing.assert_allclose(rotation_vectors(rotation_matrices(vector)), vector, atol=1e-14, rtol=1e-13)

@@ -162,6 +162,7 @@ class CollisionResolver:
         self._most = _CLEARANCE * float(lengths.mean()) if len(lengths) else 0.0
         self._rounding = 1e-9 * pair.diagonal
 
+    @np.errstate(over="ignore", invalid="ignore")  # vertices whose distance is infinite are not near
     def pushed(self, index: int, positions: Floats, time: float) -> tuple[Bools, Floats]:
         """Move the vertices that are too close to the collider.
 

@@ -61,6 +61,7 @@ class SurfaceDistance:
             size *= _FAN
             self._levels.insert(0, _Slabs.around(corners, normals, size))
 
+    @np.errstate(over="ignore", invalid="ignore")  # of queries so far away that their squares are infinite
     def nearest(self, queries: Floats) -> tuple[Floats, Floats, Floats]:
         """Signed distances and nearest points of the surface for points (q, 3).
 

@@ -3,7 +3,7 @@
 #
 #   make demo     bake the demo file; the results are left in demo/
 #   make test     everything: environment, ruff, mypy, pytest
-#   make quick    the solver's tests without the slow ones, for while you work: no Blender, under three minutes
+#   make quick    the solver's tests without the slow ones, for while you work: no Blender
 #   make assets   make the demo files again with the script that made them
 #   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
 #                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python

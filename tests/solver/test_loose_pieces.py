@@ -18,7 +18,7 @@ from qc3d_addon.solver.surface.rigid_parts import RigidParts
 
 from .meshes import box_surface
 
-pytestmark = pytest.mark.usefixtures("coarse_volume")
+pytestmark = [pytest.mark.usefixtures("coarse_volume"), pytest.mark.slow]
 
 CARD = np.array([[-0.5, -0.7, 0.0], [0.5, -0.7, 0.0], [0.5, 0.7, 0.0], [-0.5, 0.7, 0.0]])
 CARD_FACES = np.array([[0, 1, 2], [0, 2, 3]])

@@ -30,7 +30,7 @@ from qc3d_addon.solver.support.progress import finish
 from .baking import frames_of
 from .meshes import arced, box_surface, enclosed_volume, icosphere, twisted
 
-pytestmark = pytest.mark.usefixtures("coarse_volume")
+pytestmark = [pytest.mark.usefixtures("coarse_volume"), pytest.mark.slow]
 
 T = TypeVar("T")
 Keys = tuple[Floats, Floats, Ints] | tuple[Floats, Floats, Ints, Ints]

@@ -39,10 +39,7 @@ class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
         return plan_bake(obj, bake_request(self))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        end_previews()
-        result = write_bake(plan, outcome)
-        show_newest(plan.locate())
-        return [*result.notes, result.summary()]
+        return _written(plan, outcome)
 
 
 class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
@@ -63,10 +60,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         return plan_bake(obj, request_again(obj, chain))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        end_previews()
-        result = write_bake(plan, outcome)
-        show_newest(plan.locate())
-        return [*result.notes, result.summary()]
+        return _written(plan, outcome)
 
 
 class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
@@ -86,10 +80,7 @@ class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
         return plan_one_more(obj, chosen_chain(obj, self.slider))
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
-        end_previews()
-        result = write_bake(plan, outcome)
-        show_newest(plan.locate())
-        return [*result.notes, result.summary()]
+        return _written(plan, outcome)
 
 
 class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
@@ -132,3 +123,11 @@ class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
             names = ", ".join(f"'{name}'" for name in self._left_out)
             notes.append(f"Left out, because keys are missing or the same mesh was already baked: {names}.")
         return [*notes, f"{len(results)} objects baked together. {results[0].summary()}"]
+
+
+def _written(plan: Plan, outcome: "Outcome") -> list[str]:
+    """Write what a bake made and choose it in the list; sentences for the user."""
+    end_previews()
+    result = write_bake(plan, outcome)
+    show_newest(plan.locate())
+    return [*result.notes, result.summary()]

@@ -62,6 +62,7 @@ class MirrorImages:
             numbers = np.arange(len(partners))
             if np.max(distances) <= _SYMMETRIC * self._size and (partners[partners] == numbers).all():
                 self._planes.append(_Plane(normal, point, partners))
+        self._own = self._asymmetries()
 
     def __bool__(self) -> bool:
         return bool(self._planes)
@@ -74,13 +75,18 @@ class MirrorImages:
             for plane in self._planes
             if np.linalg.norm(plane.image(shape) - shape, axis=1).max(initial=0.0) <= _ONE_SIDED * self._size
         ]
+        self._own = self._asymmetries()
 
     def averaged(self, shape: Floats, time: float) -> Floats:
         """A shape (n, 3) at ``time`` in the keys' coordinates, as symmetric as the keys: their own asymmetry stays."""
         if not self._planes:
             return shape
-        own = [key - self._symmetric(key) for key in self._keys]
-        return self._symmetric(shape) + ((1.0 - time) * own[0] + time * own[1])
+        first, second = self._own
+        return self._symmetric(shape) + ((1.0 - time) * first + time * second)
+
+    def _asymmetries(self) -> list[Floats]:
+        """(n, 3) how far each key is from its symmetric form."""
+        return [key - self._symmetric(key) for key in self._keys]
 
     def _symmetric(self, shape: Floats) -> Floats:
         for plane in self._planes:

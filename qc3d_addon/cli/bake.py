@@ -113,7 +113,7 @@ def _run(arguments: argparse.Namespace) -> None:
             return list(result.notes), result.report
 
         def bake_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
-            verdicts = bake_object_keys(obj, arguments.on_keys, request, bars)
+            verdicts = bake_object_keys(obj, arguments.on_keys, request, bars.of_keys)
             if all(verdict.ended == "failed" for verdict in verdicts):
                 raise InputError(" ".join(map(str, verdicts)))
             values = [{"key": one.key, "ended": one.ended, "text": one.text, "report": one.report} for one in verdicts]

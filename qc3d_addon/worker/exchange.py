@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..solver.collision.colliders import Collider
 from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
+from ..solver.frames.many import Run
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
 from ..solver.keys.halves import MirrorPlane
@@ -22,13 +23,46 @@ from ..solver.keys.keypair import KeyPair
 from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
 _PAIR = ("key0", "key1", "faces", "edges", "polygons")
-_TASK, _OUTCOME = "task.json", "outcome.json"
+_TASK, _OUTCOME, _RUN = "task.json", "outcome.json", "run.json"
 
 
-def write_task(folder: Path, task: Task) -> None:
-    """Write a task into an empty folder; ``read_task`` reads it."""
+def write_run(folder: Path, run: Run) -> None:
+    """Write a run into an empty folder; arrays that tasks have in common are written once."""
+    first = None
+    for number, task in enumerate(run.tasks):
+        of_task = folder_of(folder, number)
+        of_task.mkdir(mode=0o700)
+        write_task(of_task, task, first)
+        first = first or next(iter(task.pairs.values()))
+    _write_json(folder / _RUN, {"tasks": len(run.tasks), "memory_mb": run.memory_mb})
+
+
+def read_run(folder: Path) -> Run:
+    """Read the run that ``write_run`` wrote."""
+    header = _read_json(folder / _RUN)
+    tasks: list[Task] = []
+    for number in range(header["tasks"]):
+        first = next(iter(tasks[0].pairs.values())) if tasks else None
+        tasks.append(read_task(folder_of(folder, number), first))
+    return Run(tuple(tasks), header["memory_mb"])
+
+
+def is_run(folder: Path) -> bool:
+    """Whether the folder holds a run."""
+    return (folder / _RUN).exists()
+
+
+def folder_of(folder: Path, number: int) -> Path:
+    """The folder of one of the tasks of a run."""
+    return folder / f"task{number}"
+
+
+def write_task(folder: Path, task: Task, like: KeyPair | None = None) -> None:
+    """Write a task into an empty folder; ``read_task`` reads it. Arrays that are those of ``like`` are left out."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
-        _write(folder / f"pair{number}.npz", **{name: getattr(pair, name) for name in _PAIR})
+        arrays = {name: getattr(pair, name) for name in _PAIR}
+        own = {name: array for name, array in arrays.items() if like is None or array is not getattr(like, name)}
+        _write(folder / f"pair{number}.npz", **own)
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
@@ -45,8 +79,8 @@ def write_task(folder: Path, task: Task) -> None:
     _write_json(folder / _TASK, header)
 
 
-def read_task(folder: Path) -> Task:
-    """Read the task that ``write_task`` wrote."""
+def read_task(folder: Path, like: KeyPair | None = None) -> Task:
+    """Read the task that ``write_task`` wrote, beside the same ``like``."""
     header = _read_json(folder / _TASK)
     planes = tuple(
         MirrorPlane(tuple(plane["normal"]), tuple(plane["direction"]), plane["offset"], plane["reach"])
@@ -55,7 +89,8 @@ def read_task(folder: Path) -> Task:
     pairs, kept = {}, {}
     for number, (first, second) in enumerate(header["ends"]):
         with np.load(folder / f"pair{number}.npz", allow_pickle=False) as stored:
-            pairs[first, second] = replace(KeyPair(*(stored[name] for name in _PAIR)), planes=planes)
+            arrays = [stored[name] if name in stored.files else getattr(like, name) for name in _PAIR]
+        pairs[first, second] = replace(KeyPair(*arrays), planes=planes)
         path = folder / f"kept{number}.map"
         if path.exists():
             kept[first, second] = path.read_bytes()

@@ -16,6 +16,7 @@ from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.run import bake_object_keys
 from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.frames.many import Ended, Run
 from qc3d_addon.solver.settings import FrameOptions
 from qc3d_addon.worker import client
 
@@ -116,13 +117,13 @@ def test_the_operator_with_some_keys(face: bpy.types.Object) -> None:
 def test_interrupted_nothing_is_written(
     face: bpy.types.Object, state: State, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, before, calls = client.run, state(), []
+    before = state()
 
-    def interrupted(*arguments: Any) -> object:  # noqa: ANN401
-        calls.append(arguments)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return run(*arguments)
+    def interrupted(job: Run, *_: object) -> object:
+        for step in job.carried_out():
+            if isinstance(step, Ended):
+                raise KeyboardInterrupt
+        raise AssertionError("nothing has ended")
 
     monkeypatch.setattr(client, "run", interrupted)
     with pytest.raises(RuntimeError, match="was interrupted; nothing was changed"):

@@ -48,23 +48,18 @@ class MetKeys:
 
     Parameters
     ----------
-    mesh : TetMesh
-    landmarks : (n, N) sparse
-        Barycentric coordinates of the first key's vertices.
     maps : (K + 1, N, 3)
         Fold-free maps, evenly spaced in time, from the identity to the one that meets the second key.
     turns : (M, 3)
         Rotation vectors of the last map's tetrahedra, in the branch that the motion takes.
     """
 
-    mesh: TetMesh
-    landmarks: csr_array
     maps: Floats
     turns: Floats
 
 
 def meet_keys(
-    embedding: Embedding, coarse: TetMesh, mesh: TetMesh, targets: Sequence[Floats]
+    embedding: Embedding, coarse: TetMesh, mesh: TetMesh, landmarks: csr_array, targets: Sequence[Floats]
 ) -> Generator[float, None, MetKeys]:
     """Follow the motion with a coarse mesh and meet the second key with a fine one.
 
@@ -73,6 +68,8 @@ def meet_keys(
     embedding : Embedding
     coarse, mesh : TetMesh
         Tetrahedral meshes of the cube; the second is as fine as the surface.
+    landmarks : (n, N) sparse
+        Barycentric coordinates of the first key's vertices in the fine mesh.
     targets : sequence of (n, 3)
         Target positions of the vertices after each step, in cube units; the last is the second key.
 
@@ -88,7 +85,7 @@ def meet_keys(
     followed.maps[-1] = StiffFitter(coarse, coarse_landmarks, _WEIGHTS[0] / LANDMARK_WEIGHT * base).fit(
         followed.maps[-1], embedding.key1, _ITERATIONS[0]
     )
-    fitter = StiffFitter(mesh, interpolation_matrix(mesh, embedding.key0), base)
+    fitter = StiffFitter(mesh, landmarks, base)
     carry = interpolation_matrix(coarse, mesh.points)
     maps = np.empty((len(followed.maps), *mesh.points.shape))
     maps[0] = mesh.points
@@ -115,7 +112,7 @@ def meet_keys(
         yield 0.2 + 0.8 * min(1.0, (number + 1) / len(_WEIGHTS))
     turned = rotation_vectors(polar_decomposition(mesh.jacobians(maps[-1])).rotation)
     turns = nearest_branch(turned, followed.turns[locate(coarse, mesh.centroids)[0]])
-    return MetKeys(mesh, fitter.landmarks, maps, turns)
+    return MetKeys(maps, turns)
 
 
 def crossing_vertices(embedding: Embedding) -> Bools:

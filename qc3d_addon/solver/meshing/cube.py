@@ -41,7 +41,9 @@ class FilledCube:
     notes: tuple[str, ...]
 
 
-def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = FINE_SHARE) -> FilledCube:
+def fill_cube(
+    points: Floats, faces: Ints, options: FitOptions, share: float = FINE_SHARE, size: float = 1.0
+) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
     The surface's vertices do not become vertices of the mesh: its resolution depends on ``options.quality``, not on
@@ -55,6 +57,10 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = F
         Triangles; they may be open, non-manifold, crossing or degenerate, and there may be none.
     options : FitOptions
         Its quality, engine, seed and time limit.
+    share : float
+        Only for the quality ``exact``: distance between samples, in edge lengths.
+    size : float
+        Size of the surface, beside its size where it fills the cube: samples on it are as many, and so much closer.
 
     Raises
     ------
@@ -68,7 +74,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = F
         mesh = vertex_mesh(points, faces, share, options.seed)
         require_filled_cube(mesh)
         return FilledCube(mesh, "delaunay", ())
-    resolution = RESOLUTIONS[options.quality].beside(points, faces)
+    resolution = RESOLUTIONS[options.quality].scaled(size).beside(points, faces)
     notes: list[str] = []
     if options.engine != "delaunay":
         try:

@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 
 BLENDER = Path(__file__).resolve().parents[1] / "qc3d_addon" / "blender"
-NAMES = {"", "QC3D"}  # of what is not translated
+NAMES = {"", "QC3D", "Delaunay", "FBX", "Tetwild", "USD", "glTF"}  # of what is not translated
 
 
 def collect() -> list[str]:

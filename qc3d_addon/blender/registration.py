@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 
 from ..worker import engines
-from . import choices, cli, compat, live_scrub, preferences, properties
+from . import choices, cli, compat, live_scrub, preferences, properties, translations
 from .bake import jobs
 from .heat_map import legend
 from .keys import straight
@@ -93,6 +93,7 @@ _commands: list[object] = []
 
 def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
+    translations.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
@@ -118,3 +119,4 @@ def unregister() -> None:
     delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    translations.unregister()

@@ -28,7 +28,7 @@ def register() -> None:
         language: {(context, text): translation for text, translation in texts.items() for context in _CONTEXTS}
         for language, texts in LANGUAGES.items()
     }
-    bpy.app.translations.register(_DOMAIN, tables)
+    bpy.app.translations.register(_DOMAIN, tables)  # type: ignore[arg-type,unused-ignore]  # 4.5's stubs: other keys
 
 
 def unregister() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 
 from ..worker import engines
-from . import choices, cli, compat, live_scrub, preferences, properties
+from . import choices, cli, compat, live_scrub, preferences, properties, translations
 from .bake import jobs
 from .heat_map import legend
 from .keys import straight
@@ -20,6 +20,7 @@ from .operators.bake_inbetweens import (
     QC3D_OT_rebake,
 )
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
+from .operators.bug_report import QC3D_OT_copy_report
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -36,6 +37,7 @@ from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
 from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
+from .operators.open_demo import QC3D_OT_open_demo
 from .operators.prepare import QC3D_OT_prepare
 from .operators.split_key import QC3D_OT_split_key
 from .operators.straight import QC3D_OT_straight
@@ -72,6 +74,8 @@ CLASSES = (
     QC3D_OT_save_map,
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
+    QC3D_OT_open_demo,
+    QC3D_OT_copy_report,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
     QC3D_OT_remove_inner_key,
@@ -89,6 +93,7 @@ _commands: list[object] = []
 
 def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
+    translations.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
@@ -114,3 +119,4 @@ def unregister() -> None:
     delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    translations.unregister()

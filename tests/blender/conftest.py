@@ -49,7 +49,7 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
     """
     calls = []
 
-    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions, size: float = 1.0) -> FilledCube:
+    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions, *_: object) -> FilledCube:
         calls.append(options)
         return six_tetrahedra()
 

@@ -14,7 +14,7 @@ from ...solver.errors import QC3DError
 from .. import compat, preferences
 from ..bake import jobs, progress_bar
 from ..kinds import present
-from .common import OperatorMixin, Status
+from .common import OperatorMixin, Status, report_error
 
 if TYPE_CHECKING:
     from ...solver.frames.many import Run
@@ -88,10 +88,10 @@ class ChildWork(Typed[Planned, Made]):
                 manager.progress_end()
             return self._finish(self.write(plan, cast("Made", outcome)))
         except KeyboardInterrupt:
-            self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
+            report_error(self, f"{self.bl_label} was interrupted; nothing was changed.")
             return {'CANCELLED'}
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
@@ -115,7 +115,7 @@ class ChildWork(Typed[Planned, Made]):
             return work()
         except QC3DError as error:
             jobs.end()
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         except BaseException:
             jobs.end()  # otherwise no other job could ever start
@@ -125,7 +125,7 @@ class ChildWork(Typed[Planned, Made]):
         """Start the work."""
         problem = jobs.busy_problem()
         if problem is not None:
-            self.report({'ERROR'}, problem)
+            report_error(self, problem)
             return {'CANCELLED'}
         self._plan = plan
         self._job = jobs.begin(self.bl_label, plan.task, preferences.limits(context))

@@ -12,7 +12,7 @@ from bpy.props import IntProperty
 from ..bake.suggested_keys import sculpted_between
 from ..kinds import present
 from ..properties import settings_of
-from .common import Status, poll_active_object
+from .common import Status, poll_active_object, report_error
 
 
 class QC3D_OT_add_inner_key(bpy.types.Operator):
@@ -50,7 +50,7 @@ class QC3D_OT_remove_inner_key(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Status:
         rows = settings_of(present(context.active_object)).via
         if self.index >= len(rows):
-            self.report({'ERROR'}, f"There is no row {self.index}; there are {len(rows)}.")
+            report_error(self, f"There is no row {self.index}; there are {len(rows)}.")
             return {'CANCELLED'}
         rows.remove(self.index)
         return {'FINISHED'}
@@ -72,7 +72,7 @@ class QC3D_OT_go_through_sculpted(bpy.types.Operator):
         settings = settings_of(obj)
         names = sculpted_between(obj, settings.last)
         if not names:
-            self.report({'ERROR'}, f"No keys are named as evenly spaced in-betweens of '{settings.last}'.")
+            report_error(self, f"No keys are named as evenly spaced in-betweens of '{settings.last}'.")
             return {'CANCELLED'}
         settings.from_key, settings.to_key = settings.first, settings.last
         settings.via.clear()

@@ -17,6 +17,7 @@ from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
+from ..triangles.topology import sides
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
@@ -26,6 +27,7 @@ from .volume import Volume, in_single_precision
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
 _MOST_NAMED = 10  # vertices
+_LEAST_EDGE = 1e-6  # cube units: shorter edges have no stretch that can be told
 
 
 def fit_pair(pair: KeyPair, options: FitOptions, shared: Volume | None = None) -> Steps[FittedMap]:
@@ -58,7 +60,10 @@ def fit_pair(pair: KeyPair, options: FitOptions, shared: Volume | None = None) -
     embedding = None if shared is None else Embedding.of(pair, shared.cube)
     if embedding is None or shared is None or shared.cube is None or not shared.cube.holds(embedding):
         embedding, shared = Embedding.of(pair), None
-    fitted = yield from (_meeting if options.quality == "exact" else _near)(embedding, options, seconds, shared)
+    if options.quality == "exact":
+        fitted = yield from _meeting(embedding, options, seconds)
+    else:
+        fitted = yield from _near(embedding, options, seconds, shared)
     notes = [*fitted.notes]
     turned = half_turned_parts(fitted.surface_path)
     missed = fitted.landmark_residual().rms
@@ -105,21 +110,32 @@ def _near(
     return FittedMap(embedding.pair, volume, *parts)
 
 
-def _meeting(
-    embedding: Embedding, options: FitOptions, seconds: dict[str, float], shared: Volume | None
-) -> Steps[FittedMap]:
+def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
     """The map that meets the second key."""
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            volume = shared or Volume.filled(embedding, options)
+            volume = Volume.filled(embedding, options, stretches=_stretches(embedding))
         yield Progress("mesh", 1.0)
+        yield Progress("fit", 0.0)
         path, targets = way.result()
-    assert volume.coarse is not None
     with timed(seconds, "fit"):
-        met = yield from staged("fit", meet_keys(embedding, volume.coarse, volume.mesh, volume.landmarks, targets))
+        followed = yield from staged("fit", meet_keys(embedding, volume.mesh, volume.landmarks, targets))
     yield Progress("fit", 1.0)
-    return FittedMap(embedding.pair, volume, met.maps, met.turns, options, embedding, (), seconds, path)
+    parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
+    return FittedMap(embedding.pair, volume, *parts)
+
+
+def _stretches(embedding: Embedding) -> Floats:
+    """(n,) how many times longer the edges at each vertex are in the second key: the largest ratio."""
+    edges = sides(embedding.pair.faces)
+    before, after = (
+        np.linalg.norm(key[edges[:, 1]] - key[edges[:, 0]], axis=1) for key in (embedding.key0, embedding.key1)
+    )
+    ratios = after / np.maximum(before, _LEAST_EDGE)
+    stretches = np.zeros(len(embedding.key0))
+    np.maximum.at(stretches, edges.ravel(), np.repeat(ratios, 2))
+    return stretches
 
 
 def _missed_notes(fitted: FittedMap) -> list[str]:

@@ -14,7 +14,6 @@ from ..arrays import Floats, Ints
 from ..keys.embedding import ROOM, Cube, Embedding
 from ..maps.volume_system import VolumeSystem
 from ..meshing.cube import fill_cube
-from ..meshing.vertex_mesh import COARSE_SHARE
 from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
@@ -40,8 +39,6 @@ class Volume:
         Positive weights of its vertices, with the sum 1.
     notes : tuple of str
         Sentences for the user, such as why another engine was used.
-    coarse : TetMesh, optional
-        A coarser mesh, for the quality ``exact``.
     cube : Cube, optional
         Where the cube stands, if it is not that of a single pair.
     """
@@ -52,12 +49,22 @@ class Volume:
     faces: Ints
     weights: Floats
     notes: tuple[str, ...] = ()
-    coarse: TetMesh | None = None
     cube: Cube | None = None
 
     @classmethod
-    def filled(cls, embedding: Embedding, options: FitOptions, cube: Cube | None = None) -> Volume:
+    def filled(
+        cls, embedding: Embedding, options: FitOptions, cube: Cube | None = None, stretches: Floats | None = None
+    ) -> Volume:
         """Fill the cube around the first key of an embedded pair.
+
+        Parameters
+        ----------
+        embedding : Embedding
+        options : FitOptions
+        cube : Cube, optional
+            The cube of the embedding, if it is not that of this pair alone.
+        stretches : (n,), optional
+            How many times longer the edges at each vertex become, for the quality ``exact``.
 
         Raises
         ------
@@ -65,13 +72,9 @@ class Volume:
             If the chosen engine cannot fill it.
         """
         key0, faces = embedding.key0, embedding.pair.faces
-        parts = (key0, faces, embedding.weights)
-        if options.quality == "exact":
-            coarse = fill_cube(key0, faces, options, COARSE_SHARE).mesh
-            made = fill_cube(key0, faces, options)
-            return cls(made.mesh, made.engine, *parts, made.notes, coarse, cube)
-        made = fill_cube(in_single_precision(key0), faces, options, size=1.0 if cube is None else 1.0 / ROOM)
-        return cls(made.mesh, made.engine, *parts, made.notes, None, cube)
+        points = key0 if options.quality == "exact" else in_single_precision(key0)
+        made = fill_cube(points, faces, options, stretches, 1.0 if cube is None else 1.0 / ROOM)
+        return cls(made.mesh, made.engine, key0, faces, embedding.weights, made.notes, cube)
 
     @cached_property
     def landmarks(self) -> csr_array:

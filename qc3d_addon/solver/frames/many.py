@@ -79,7 +79,9 @@ class _Bases:
     def __init__(self, tasks: Sequence[Task]) -> None:
         found: list[list[_Base]] = []
         for task in tasks:
-            for ends, pair in task.pairs.items() if task.needs_fits else ():
+            # The quality exact fills the cube around both keys.
+            shares = task.needs_fits and task.fit_options.quality != "exact"
+            for ends, pair in task.pairs.items() if shares else ():
                 if ends in task.kept:
                     continue
                 known = next((same for same in found if same[0].is_of(pair, task.fit_options)), None)

@@ -16,7 +16,7 @@ from .delaunay import delaunay_mesh
 from .poisson_disk import RESOLUTIONS
 from .tetwild import MARGIN, tetwild_mesh
 from .tetwild_loading import unavailable_reason
-from .vertex_mesh import FINE_SHARE, vertex_mesh
+from .vertex_mesh import vertex_mesh
 
 # As a fraction of the cube's volume. A tetrahedron with edges of 0.01 and this volume is flat up to rounding.
 SMALLEST_VOLUME = 1e-14
@@ -42,7 +42,7 @@ class FilledCube:
 
 
 def fill_cube(
-    points: Floats, faces: Ints, options: FitOptions, share: float = FINE_SHARE, size: float = 1.0
+    points: Floats, faces: Ints, options: FitOptions, stretches: Floats | None = None, size: float = 1.0
 ) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
@@ -57,10 +57,11 @@ def fill_cube(
         Triangles; they may be open, non-manifold, crossing or degenerate, and there may be none.
     options : FitOptions
         Its quality, engine, seed and time limit.
-    share : float
-        Only for the quality ``exact``: distance between samples, in edge lengths.
+    stretches : (n,), optional
+        How many times longer the edges at each vertex are in the second key; quality ``exact`` is finer there.
     size : float
         Size of the surface, beside its size where it fills the cube: samples on it are as many, and so much closer.
+        Without effect on the quality ``exact``, which follows the vertices.
 
     Raises
     ------
@@ -71,7 +72,7 @@ def fill_cube(
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
     if options.quality == "exact":
-        mesh = vertex_mesh(points, faces, share, options.seed)
+        mesh = vertex_mesh(points, faces, options.seed, stretches)
         require_filled_cube(mesh)
         return FilledCube(mesh, "delaunay", ())
     resolution = RESOLUTIONS[options.quality].scaled(size).beside(points, faces)

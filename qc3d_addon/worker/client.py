@@ -14,9 +14,10 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar, cast, overload
+from typing import Any, Generic, TypeVar, cast, overload
 
 from ..solver import errors
+from ..solver.combinations.corrections import Corrected, Corrections
 from ..solver.errors import QC3DError, WorkerError, with_remedy
 from ..solver.files.private_folders import PrivateFolder, temporary_place
 from ..solver.frames.many import Run
@@ -24,7 +25,14 @@ from ..solver.frames.task import Outcome, Task
 from ..solver.support.child_python import interpreter
 from ..solver.support.progress import Done, Progress
 from . import messages
-from .exchange import folder_of, read_outcome, write_run, write_task
+from .exchange import (
+    folder_of,
+    read_corrected,
+    read_outcome,
+    write_corrections,
+    write_run,
+    write_task,
+)
 from .idleness import LONGEST_IDLE, Idleness
 from .messages import Ending
 from .processes import how_it_ended, kill, library_folders
@@ -51,17 +59,18 @@ class Limits:
 
 
 Outcomes = list[Outcome | QC3DError]
-Result = TypeVar("Result", Outcome, Outcomes)
+Job = Task | Run | Corrections
+Result = TypeVar("Result", Outcome, Outcomes, Corrected)
 
 
 class Worker(Generic[Result]):
-    """A task, or a run of several, in a child process. Use it from one thread only, and call ``close`` at the end.
+    """A task, a run or corrections in a child process. Use it from one thread, and call ``close`` at the end.
 
     Parameters
     ----------
-    job : Task or Run
+    job : Task, Run or Corrections
         What to compute. The result of a task is its outcome; that of a run the outcome of each of its tasks, or why it
-        has none.
+        has none; that of corrections the corrected shapes.
     limits : Limits, optional
 
     Raises
@@ -76,8 +85,10 @@ class Worker(Generic[Result]):
     def __init__(self: Worker[Outcome], job: Task, limits: Limits | None = None) -> None: ...
     @overload
     def __init__(self: Worker[Outcomes], job: Run, limits: Limits | None = None) -> None: ...
+    @overload
+    def __init__(self: Worker[Corrected], job: Corrections, limits: Limits | None = None) -> None: ...
 
-    def __init__(self, job: Task | Run, limits: Limits | None = None) -> None:
+    def __init__(self, job: Job, limits: Limits | None = None) -> None:
         self._job = job
         self._limits = limits or Limits()
         job.require_memory(self._limits.memory_mb)
@@ -95,6 +106,8 @@ class Worker(Generic[Result]):
         try:
             if isinstance(job, Run):
                 write_run(self._folder.path, job)
+            elif isinstance(job, Corrections):
+                write_corrections(self._folder.path, job)
             else:
                 write_task(self._folder.path, job)
             self._process = self._start()
@@ -125,7 +138,7 @@ class Worker(Generic[Result]):
             nothing: its result has the error in the place of each task that had not ended yet.
         """
         try:
-            found: Outcome | Outcomes | None = self._polled()
+            found: Outcome | Outcomes | Corrected | None = self._polled()
         except QC3DError as error:
             if not isinstance(self._job, Run):
                 raise
@@ -138,7 +151,7 @@ class Worker(Generic[Result]):
         self._collect()
         return [self._arrived.get(number, otherwise) for number in range(len(self._job.tasks))]
 
-    def _polled(self) -> Outcome | Outcomes | None:
+    def _polled(self) -> Outcome | Outcomes | Corrected | None:
         if self._process.poll() is None:
             self._collect()
             if self._is_garbled:
@@ -171,14 +184,18 @@ class Worker(Generic[Result]):
             elif error is not None:
                 self._arrived[task] = self._error(error)
             else:
-                self._arrived[task] = self._read(folder_of(self._folder.path, task), self._job.tasks[task])
+                try:
+                    found = self._read(folder_of(self._folder.path, task), self._job.tasks[task])
+                    self._arrived[task] = cast("Outcome", found)
+                except WorkerError as unreadable:
+                    self._arrived[task] = unreadable
 
     @staticmethod
-    def _read(folder: Path, task: Task) -> Outcome | QC3DError:
+    def _read(folder: Path, job: Task | Corrections) -> Outcome | Corrected:
         try:
-            return read_outcome(folder, task)
+            return read_corrected(folder, job) if isinstance(job, Corrections) else read_outcome(folder, job)
         except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
-            return WorkerError(f"The result of the work cannot be read: {error}; run it again.")
+            raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
 
     def _error(self, told: tuple[str, str]) -> QC3DError:
         """The error that the child told by its type and its sentence."""
@@ -252,7 +269,7 @@ class Worker(Generic[Result]):
         else:
             self._ended_tasks.put(message)
 
-    def _result(self) -> Outcome | Outcomes:
+    def _result(self) -> Outcome | Outcomes | Corrected:
         ending, status = self._ending, self._process.returncode
         if self._is_garbled:
             raise WorkerError(_GARBLED)
@@ -262,10 +279,7 @@ class Worker(Generic[Result]):
             raise WorkerError(how_it_ended(status, self._errors))
         if isinstance(self._job, Run):
             return self.outcomes(WorkerError(_GARBLED))
-        found = self._read(self._folder.path, self._job)
-        if isinstance(found, QC3DError):
-            raise found
-        return found
+        return self._read(self._folder.path, self._job)
 
 
 _HANGS = (
@@ -291,17 +305,18 @@ def _out_of_memory(limits: Limits) -> str:
     return f"There is not enough memory{limit}; use fewer in-betweens, a lower quality or a smaller mesh{more}."
 
 
+OnProgress = Callable[[Progress], None]
+
+
 @overload
-def run(
-    job: Task, on_progress: Callable[[Progress], None] | None = None, limits: Limits | None = None
-) -> Outcome: ...
+def run(job: Task, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Outcome: ...
 @overload
+def run(job: Corrections, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Corrected: ...
+@overload
+def run(job: Run, on_progress: Callable[[Done], None] | None = None, limits: Limits | None = None) -> Outcomes: ...
 def run(
-    job: Run, on_progress: Callable[[Done], None] | None = None, limits: Limits | None = None
-) -> Outcomes: ...
-def run(
-    job: Task | Run, on_progress: Callable[..., None] | None = None, limits: Limits | None = None
-) -> Outcome | Outcomes:
+    job: Job, on_progress: Callable[..., None] | None = None, limits: Limits | None = None
+) -> Outcome | Outcomes | Corrected:
     """Carry out a job in a child process and wait for its result.
 
     Raises
@@ -309,7 +324,7 @@ def run(
     QC3DError
         As ``Worker`` and ``Worker.poll``.
     """
-    worker: Worker[Outcome] | Worker[Outcomes] = Worker(job, limits)
+    worker: Worker[Any] = Worker(job, limits)
     shown = None
     try:
         while True:
@@ -318,7 +333,7 @@ def run(
                 shown = worker.progress
                 on_progress(shown)
             if result is not None:
-                return result
+                return cast("Outcome | Outcomes | Corrected", result)
             clock.sleep(_POLL_SECONDS)
     finally:
         worker.close()

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.collision.colliders import Collider
+from ..solver.combinations.corrections import Corrected, Corrections
 from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
 from ..solver.frames.many import Run
@@ -23,7 +24,8 @@ from ..solver.keys.keypair import KeyPair
 from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
 _PAIR = ("key0", "key1", "faces", "edges", "polygons")
-_TASK, _OUTCOME, _RUN = "task.json", "outcome.json", "run.json"
+_OF_CORRECTIONS = ("base", "alone", "sculpted", "places", "values", "faces", "edges")
+_TASK, _OUTCOME, _RUN, _CORRECTIONS = "task.json", "outcome.json", "run.json", "corrections.json"
 
 
 def write_run(folder: Path, run: Run) -> None:
@@ -104,6 +106,53 @@ def read_task(folder: Path, like: KeyPair | None = None) -> Task:
     if play is not None:
         play = PlayOptions(**{**play, "also_at": tuple(play["also_at"])})
     return Task(pairs, tuple(header["through"]), *options, times, kept, collider, play)
+
+
+def write_corrections(folder: Path, wanted: Corrections) -> None:
+    """Write what is wanted of keys that are on at once into an empty folder; ``read_corrections`` reads it."""
+    _write(folder / "keys.npz", **{name: getattr(wanted, name) for name in _OF_CORRECTIONS})
+    header = {"find_order": wanted.find_order, "fit_options": asdict(wanted.fit_options)}
+    _write_json(folder / _CORRECTIONS, header)
+
+
+def read_corrections(folder: Path) -> Corrections:
+    """Read what ``write_corrections`` wrote."""
+    header = _read_json(folder / _CORRECTIONS)
+    with np.load(folder / "keys.npz", allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in _OF_CORRECTIONS}
+    return Corrections(**arrays, find_order=header["find_order"], fit_options=FitOptions(**header["fit_options"]))
+
+
+def is_of_corrections(folder: Path) -> bool:
+    """Whether the folder holds what is wanted of keys that are on at once."""
+    return (folder / _CORRECTIONS).exists()
+
+
+def write_corrected(folder: Path, made: Corrected) -> None:
+    """Write the shapes of keys that are on at once into the same folder."""
+    _write(folder / "shapes.npz", shapes=made.shapes)
+    header = {"order": list(made.order), "crossings": made.crossings, "off": made.off, "is_sculpted": made.is_sculpted}
+    _write_json(folder / _OUTCOME, header)
+
+
+def read_corrected(folder: Path, wanted: Corrections) -> Corrected:
+    """Read the shapes that ``write_corrected`` wrote.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If they are incomplete, or not what was wanted.
+    """
+    header = _read_json(folder / _OUTCOME)
+    with np.load(folder / "shapes.npz", allow_pickle=False) as stored:
+        shapes = stored["shapes"]
+    if sorted(header["order"]) != list(range(len(wanted.alone))):
+        raise ValueError("the order is not that of the keys")
+    if shapes.shape != (len(wanted.places), *wanted.base.shape) or not np.isfinite(shapes).all():
+        raise ValueError("the shapes are not those asked for")
+    return Corrected(
+        tuple(header["order"]), shapes, int(header["crossings"]), float(header["off"]), bool(header["is_sculpted"])
+    )
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:

@@ -24,7 +24,8 @@ def messages(folder: Path) -> Iterator[dict[str, Any]]:
     An error that is a bug is raised: it ends the process, whose parent says so.
     """
     try:
-        for message in _run(folder) if exchange.is_run(folder) else _task(folder):
+        work = _run if exchange.is_run(folder) else _corrections if exchange.is_of_corrections(folder) else _task
+        for message in work(folder):
             yield as_json(message)
     except _KNOWN as error:
         yield as_json(Ending(None, _told(error)))
@@ -35,6 +36,11 @@ def messages(folder: Path) -> Iterator[dict[str, Any]]:
 def _task(folder: Path) -> Iterator[Message]:
     outcome = yield from exchange.read_task(folder).carried_out()
     exchange.write_outcome(folder, outcome)
+
+
+def _corrections(folder: Path) -> Iterator[Message]:
+    made = yield from exchange.read_corrections(folder).carried_out()
+    exchange.write_corrected(folder, made)
 
 
 def _run(folder: Path) -> Iterator[Message]:

@@ -8,18 +8,22 @@ import os
 import signal
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from qc3d_addon.solver.combinations.corrections import Corrections
 from qc3d_addon.solver.errors import InputError, QC3DError, WorkerError
 from qc3d_addon.solver.frames.many import Run
 from qc3d_addon.solver.frames.task import Outcome, Task
-from qc3d_addon.solver.support.progress import Done
+from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.support.progress import Done, Progress, finish
 from qc3d_addon.worker import client
 from qc3d_addon.worker.client import Limits, Worker
 
+from ..solver.combinations.arm import arm, posed
 from .test_client import DONE, KEYS, is_alive, play, small_task, stand_in, temporary
 
 __all__ = ["stand_in", "temporary"]
@@ -139,3 +143,40 @@ def test_common_arrays_are_written_once(temporary: Path) -> None:
     with np.load(folder / "task1" / "pair0.npz") as stored:
         assert stored.files == ["key1", "edges"] or stored.files == ["key1"]
     worker.close()
+
+
+class TestCorrections:
+    """Keys that are on at once."""
+
+    @staticmethod
+    def wanted() -> Corrections:
+        rest, faces = arm()
+        keys = [posed(rest, 0.0, 60.0, (0.0, 1.0, 0.0)), posed(rest, 50.0, 0.0)]
+        alone = np.stack([[rest + 0.5 * (key - rest), key] for key in keys])
+        places = np.array([[0, 1], [1, 1]])
+        both = rest + sum(key - rest for key in keys)
+        edges = np.empty((0, 2), dtype=np.int64)
+        return Corrections(rest, alone, both, places, np.array([0.5, 1.0]), faces, edges, True, FitOptions())
+
+    def test_the_child_makes_what_this_process_would(self, temporary: Path) -> None:
+        seen: list[Progress] = []
+        found, expected = client.run(self.wanted(), seen.append), finish(self.wanted().carried_out())
+        np.testing.assert_array_equal(found.shapes, expected.shapes)
+        for name in ("order", "crossings", "off", "is_sculpted"):
+            assert getattr(found, name) == getattr(expected, name)
+        assert found.order == (1, 0)
+        assert seen[-1].overall == 1.0
+        assert list(temporary.iterdir()) == []
+
+    def test_errors_are_those_of_the_work(self, temporary: Path) -> None:
+        wanted = self.wanted()
+        with pytest.raises(InputError, match="not finite"):
+            client.run(replace(wanted, alone=np.where(wanted.alone > 1.0, np.nan, wanted.alone)))
+        with pytest.raises(InputError, match=r"needs about .* limit is 20 MB"):
+            client.run(wanted, None, Limits(memory_mb=20))
+
+    def test_a_result_that_is_none(self, stand_in: Path, temporary: Path) -> None:
+        play(stand_in, DONE)
+        with pytest.raises(WorkerError, match="cannot be read"):
+            client.run(self.wanted())
+        assert list(temporary.iterdir()) == []

@@ -14,6 +14,7 @@ import bpy
 from .. import compat
 
 if TYPE_CHECKING:
+    from ...solver.combinations.corrections import Corrections
     from ...solver.errors import QC3DError
     from ...solver.frames.many import Run
     from ...solver.frames.task import Outcome, Task
@@ -29,7 +30,7 @@ class Job:
         If the child process cannot be started.
     """
 
-    def __init__(self, label: str, task: Task | Run, limits: Limits) -> None:
+    def __init__(self, label: str, task: Task | Run | Corrections, limits: Limits) -> None:
         from ...worker.client import Worker
 
         self.label = label
@@ -80,7 +81,7 @@ def current() -> Job | None:
     return _current
 
 
-def begin(label: str, task: Task | Run, limits: Limits) -> Job:
+def begin(label: str, task: Task | Run | Corrections, limits: Limits) -> Job:
     """Start a job; at most one runs at a time.
 
     Raises

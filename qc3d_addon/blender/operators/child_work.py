@@ -17,14 +17,13 @@ from ..kinds import present
 from .common import OperatorMixin, Status, report_error
 
 if TYPE_CHECKING:
-    from ...solver.frames.many import Run
-    from ...solver.frames.task import Task
+    from ...worker.client import Job
 
     class HasTask(Protocol):
         """What an operator plans."""
 
         @property
-        def task(self) -> Task | Run:
+        def task(self) -> Job:
             """What to compute."""
 
     Planned = TypeVar("Planned", bound=HasTask)

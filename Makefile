@@ -20,17 +20,21 @@ BIN := $(VENV)/bin
 
 .PHONY: demo test quick lint assets extension clean
 
-KEYS := --object Arm --from Basis --to "Bend and twist"
+FIGURE := qc3d_addon/demo/figure.blend
+BEND := --object Arm --from Basis --to Bend
+BLINK := --object Lids --from Basis --to Blink.L
 
 demo: $(VENV)/installed
 	rm -rf demo && mkdir demo
-	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 \
-	    --output demo/limb.blend --report demo/limb.json
-	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 --mode linear \
-	    --output demo/limb_linear.blend --report demo/limb_linear.json
-	$(BIN)/python tools/contact_sheet.py "mode linear=demo/limb_linear.blend" "mode natural=demo/limb.blend" --straight \
-	    $(KEYS) --output demo/limb.png
-	@echo "Look at demo/limb.png, open demo/limb.blend in Blender and press play, read demo/limb.json."
+	$(BIN)/qc3d bake $(FIGURE) $(BEND) --frames 5 --mode linear --output demo/linear.blend
+	$(BIN)/qc3d bake $(FIGURE) $(BEND) --frames 5 --output demo/arm.blend --report demo/arm.json
+	$(BIN)/qc3d bake demo/arm.blend $(BLINK) --frames 5 --colliders Eyes --output demo/figure.blend --report demo/lids.json
+	$(BIN)/python tools/contact_sheet.py "mode linear=demo/linear.blend" "mode natural=demo/figure.blend" --straight \
+	    $(BEND) --view front --output demo/arm.png
+	$(BIN)/python tools/contact_sheet.py "mode natural=demo/figure.blend" --straight $(BLINK) --scenery Eye.L \
+	    --output demo/lids.png
+	rm demo/linear.blend demo/arm.blend
+	@echo "Look at demo/arm.png and demo/lids.png, open demo/figure.blend in Blender and press play, read demo/arm.json."
 
 test: $(VENV)/installed lint
 	$(BIN)/python -m pytest

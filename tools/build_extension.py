@@ -143,13 +143,17 @@ def fetch(wheel: Wheel) -> Path:
         package, version, python, abi, platform = wheel.parts
         tags = [f"--platform={tag}" for tag in platform.split(".")]
         only = ["--no-deps", "--only-binary=:all:", "--require-hashes", "--implementation=cp", "--retries=1"]
-        with tempfile.TemporaryDirectory() as folder:
+        CACHE.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=CACHE) as folder:  # another build may download the same wheel meanwhile
             requirement = Path(folder) / "requirement.txt"
             requirement.write_text(f"{package}=={version} --hash=sha256:{wheel.sha256}\n", encoding="utf-8")
             command = [sys.executable, "-m", "pip", "download", "--quiet", *only, f"--python-version={python[2:]}"]
-            command += [f"--abi={abi}", *tags, f"--dest={CACHE}", f"--requirement={requirement}"]
+            command += [f"--abi={abi}", *tags, f"--dest={folder}", f"--requirement={requirement}"]
             run = subprocess.run(command, capture_output=True, text=True)
-        if run.returncode != 0 or not path.exists():
+            brought = Path(folder) / wheel.file
+            if run.returncode == 0 and brought.exists():
+                brought.replace(path)
+        if not path.exists():
             reason = (run.stderr.strip() or "pip brought another file").splitlines()[-1]
             if re.search(r"connection|timed out|resolution", run.stderr, re.IGNORECASE):
                 raise UnreachableError(f"{wheel.file} cannot be downloaded: the package registry cannot be reached.")

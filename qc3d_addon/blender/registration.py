@@ -41,6 +41,7 @@ from .operators.inner_keys import (
 )
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
+from .operators.open_demo import QC3D_OT_open_demo
 from .operators.prepare import QC3D_OT_prepare
 from .operators.split_key import QC3D_OT_split_key
 from .operators.straight import QC3D_OT_straight
@@ -78,6 +79,7 @@ CLASSES = (
     QC3D_OT_save_map,
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
+    QC3D_OT_open_demo,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
     QC3D_OT_keys_from_timeline,

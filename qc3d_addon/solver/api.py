@@ -313,6 +313,15 @@ def combine(
     QC3DError
         If the keys, weights, order or options cannot be used, if the volume of a key with a weight between 0 and 1
         cannot be filled, or if memory would not be enough.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> turned, longer = corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], corners * [2.0, 1.0, 1.0]
+    >>> qc3d.combine(corners, [turned, longer], faces).shape[1].round(6) + 0.0  # the sum has (1, 1, 0)
+    array([0., 2., 0.])
     """
     return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
 
@@ -338,6 +347,15 @@ def judge_pairs(
     ------
     InputError
         If the keys cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> turned, longer = corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], corners * [2.0, 1.0, 1.0]
+    >>> [verdict.adding_is_right for verdict in qc3d.judge_pairs(corners, [turned, longer], faces)]
+    [False]
     """
     return verdicts(KeysOnBase(base, keys, faces, edges), pairs)
 

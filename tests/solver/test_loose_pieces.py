@@ -56,6 +56,22 @@ def test_congruent_pieces_are_rigid_and_cross_no_more_than_the_straight_blend(sh
         assert counts.excess(frame) <= straight
 
 
+def test_a_piece_that_is_turned_inside_out_goes_straight_and_the_others_stay_rigid() -> None:
+    key0, key1, triangles = scattered(BOX, BOX_FACES, 6)
+    inside_out = slice(2 * len(BOX), 3 * len(BOX))
+    middle = key1[inside_out].mean(axis=0)
+    key1[inside_out] = middle + (key1[inside_out] - middle) * [0.4, 0.3, -0.3]
+    key1[: len(BOX)] = key0[: len(BOX)]  # still: so the whole has no motion of its own
+    bake = qc3d.bake([key0, key1], triangles, 3)
+    straight = key0 + bake.times[:, None, None] * (key1 - key0)
+    assert np.abs((bake.frames - straight)[:, inside_out]).max() < 1e-5
+    others = [piece for piece in range(6) if piece != 2]
+    for frame in bake.frames[1:-1]:
+        pieces = zip(key0.reshape(6, -1, 3)[others], frame.reshape(6, -1, 3)[others], strict=True)
+        assert max(rigid_misfit(*piece) for piece in pieces) < 1e-9
+    assert any("turned inside out" in note for note in bake.report.notes)
+
+
 class TestRigidParts:
     def parts(self, change: float = 0.0) -> tuple[RigidParts, Floats, Floats]:
         key0, key1, _ = scattered(BOX, BOX_FACES, 3)

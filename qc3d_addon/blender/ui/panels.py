@@ -22,6 +22,7 @@ from ..operators.inner_keys import (
     QC3D_OT_remove_inner_key,
 )
 from ..operators.map_files import QC3D_OT_load_map
+from ..operators.open_demo import QC3D_OT_open_demo
 from ..operators.prepare import QC3D_OT_prepare
 from ..properties import ObjectSettings, panel_keys, settings_of
 from ..store import checks, records
@@ -77,6 +78,10 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
                 together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')
         if problem is not None:
             draw_sentence(context, layout, problem)
+            if checks.object_problem(obj) is not None:  # nothing to work on: something to try
+                demo = layout.column()
+                demo.operator_context = IN_THE_SIDEBAR
+                demo.operator(QC3D_OT_open_demo.bl_idname, icon='ARMATURE_DATA')
             return
         obj = present(obj)
         notice = engines.engine_notice() if settings_of(obj).engine != 'delaunay' else None

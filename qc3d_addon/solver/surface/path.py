@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned
@@ -127,7 +127,7 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
-        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels)
+        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, self._closed.reversal(self._key0, key1))
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, flipped)
         self._rigid = RigidParts(self._key0, key1, ~self._free, weights, labels)
         area = float(self.deformation.weights.sum())
@@ -218,6 +218,14 @@ class SurfacePath:
             self._lengths_first.straightened(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)
         ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
+
+    def bends(self, shape: Floats) -> Bools:
+        """(n,) the vertices of components that are congruent in both keys and that a shape (n, 3) would bend."""
+        return np.asarray(self._rigid.bent(shape[self.vertices])[self._group])
+
+    def length_excess(self, shape: Floats) -> float:
+        """How far edges of a shape (n, 3) leave the interval between their key lengths: the 99th percentile of all."""
+        return self._lengths_first.lost(shape[self.vertices])
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
         """(n, 3) positions of all vertices; coincident ones keep the tiny, interpolated offsets of their keys."""

@@ -129,6 +129,7 @@ def chain_written(
     stale = [key for key in owned.values() if key not in kept.values()]
     active = obj.active_shape_key
     curve: bpy.types.FCurve | None = None
+    wanted: slider.Keyframes = ()
     notes: list[str] = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
@@ -151,15 +152,16 @@ def chain_written(
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
         if keyframes is not None:
-            curve, notes = slider.begin_keyframes(control, chain, keyframe_values(keyframes, via_at), undo)
+            wanted = keyframe_values(keyframes, via_at)
+            curve, notes = slider.begin_keyframes(control, chain, wanted, undo)
         chain.keys = {step: written[step].name for step in sorted(written)}
         chain.keyframes = chain.keyframes if curve is None else keyframes
         yield undo, notes
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
     _let_play(kept, control, weights)
-    if curve is not None and keyframes is not None:
-        slider.set_keyframes(curve, keyframe_values(keyframes, via_at))
+    if curve is not None:
+        slider.set_keyframes(curve, wanted)
     remove_keys(obj, stale)
 
 

@@ -151,7 +151,9 @@ class Chain:
     def via_at(self) -> tuple[float, ...]:
         """Places of the inner keys, where the newest bake was told them; otherwise empty: they are evenly spaced."""
         values = self.request.get("via_at")
-        return tuple(float(value) for value in values) if isinstance(values, list) else ()
+        if not isinstance(values, list) or not all(isinstance(value, float) for value in values):
+            return ()
+        return tuple(values)
 
     def _setting(self, name: str) -> str:
         settings = self.request.get("settings")

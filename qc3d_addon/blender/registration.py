@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 
 from ..worker import engines
-from . import choices, cli, compat, live_scrub, preferences, properties
+from . import choices, cli, compat, live_scrub, preferences, properties, translations
 from .bake import jobs
 from .heat_map import legend
 from .keys import straight
@@ -20,6 +20,7 @@ from .operators.bake_inbetweens import (
     QC3D_OT_rebake,
 )
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
+from .operators.bug_report import QC3D_OT_copy_report
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -80,6 +81,7 @@ CLASSES = (
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
     QC3D_OT_open_demo,
+    QC3D_OT_copy_report,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
     QC3D_OT_keys_from_timeline,
@@ -98,6 +100,7 @@ _commands: list[object] = []
 
 def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
+    translations.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
@@ -123,3 +126,4 @@ def unregister() -> None:
     delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    translations.unregister()

@@ -14,7 +14,7 @@ from ..bake.suggested_keys import are_even, sculpted_between
 from ..bake.timeline import keys_on_timeline
 from ..kinds import present
 from ..properties import settings_of
-from .common import Status, poll_active_object
+from .common import Status, poll_active_object, report_error
 
 
 class QC3D_OT_add_inner_key(bpy.types.Operator):
@@ -58,7 +58,7 @@ class QC3D_OT_remove_inner_key(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Status:
         rows = settings_of(present(context.active_object)).via
         if self.index >= len(rows):
-            self.report({'ERROR'}, f"There is no row {self.index}; there are {len(rows)}.")
+            report_error(self, f"There is no row {self.index}; there are {len(rows)}.")
             return {'CANCELLED'}
         rows.remove(self.index)
         return {'FINISHED'}
@@ -80,7 +80,7 @@ class QC3D_OT_go_through_sculpted(bpy.types.Operator):
         settings = settings_of(obj)
         names = sculpted_between(obj, settings.last)
         if not names:
-            self.report({'ERROR'}, f"No keys are named as in-betweens of '{settings.last}'.")
+            report_error(self, f"No keys are named as in-betweens of '{settings.last}'.")
             return {'CANCELLED'}
         settings.from_key, settings.to_key = settings.first, settings.last
         settings.via_timing = "even" if are_even([*names.values()]) else "value"
@@ -107,7 +107,7 @@ class QC3D_OT_keys_from_timeline(bpy.types.Operator):
         try:
             row = keys_on_timeline(obj, present(context.scene).frame_current)
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         settings = settings_of(obj)
         settings.from_key, settings.to_key = row.keys[0], row.keys[-1]

@@ -215,7 +215,8 @@ class BakeChoices(MapChoices):
 class TimedChoices(BakeChoices):
     """The keys, when each is shown, and the in-betweens to make between them.
 
-    Numbers in a text, since properties have no lists of any length.
+    Numbers in a text, since properties have no lists of any length. They are hidden, since only scripts need them: the
+    panel has a row for each key.
     """
 
     if TYPE_CHECKING:
@@ -226,11 +227,11 @@ class TimedChoices(BakeChoices):
             name="Values",
             description="Values of the slider or of the last key that show the keys to go through, such as "
             "\"0.25 0.6\"; empty for even ones",
-            options={'SKIP_SAVE'},
+            options={'SKIP_SAVE', 'HIDDEN'},
         )
         via_frames: StringProperty(
             name="Frames",
             description="Frames that show the keys to go through, such as \"12 18\"; what plays the in-betweens gets "
             "keyframes there, at Start and at End",
-            options={'SKIP_SAVE'},
+            options={'SKIP_SAVE', 'HIDDEN'},
         )

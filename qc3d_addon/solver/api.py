@@ -352,6 +352,7 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    mirror: Mirror = "auto",
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Combination:
@@ -370,6 +371,8 @@ def combine(
     order : sequence of int, optional
         Indices of the keys, outermost first: the motion of a key happens inside those before it. By default, the outer
         of two keys is the one that turns more where the other bends.
+    mirror : Mirror
+        See ``fit``: of a half mesh, the mirrored whole is combined, and its seam stays on the plane.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -390,7 +393,8 @@ def combine(
     >>> qc3d.combine(corners, [turned, longer], faces).shape[1].round(6) + 0.0  # the sum has (1, 1, 0)
     array([0., 2., 0.])
     """
-    return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
+    work = steps.combine(base, keys, faces, edges, weights=weights, order=order, mirror=mirror, **options)
+    return work.run(progress)
 
 
 def judge_pairs(

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .collision.colliders import Collider
-from .combinations import combine as combining
+from .combinations import mirrored
 from .combinations.base import KeysOnBase
 from .combinations.combine import Combination
 from .errors import InputError, QC3DError
@@ -176,10 +176,12 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    mirror: Mirror = "auto",
     **options: Unpack[FitChoices],
 ) -> Work[Combination]:
     """The combination of several keys, step by step; see :func:`.api.combine` for the parameters."""
-    return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
+    given = KeysOnBase(base, keys, faces, edges)
+    return Work(mirrored.combine_halves(given, mirror, weights, order, FitOptions(**options)))
 
 
 def bake_together(

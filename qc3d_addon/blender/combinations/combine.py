@@ -23,11 +23,12 @@ from ..kinds import keys_of, present
 from ..store import checks, combined_keys, names
 from ..store.combined_keys import Combined
 from ..store.mesh_data import key_coordinates, set_key_coordinates
-from .halves import MirroredShapes
+from .halves import completed
 from .probe import probed
 
 if TYPE_CHECKING:
     from ...solver.combinations.corrections import Corrected, Corrections
+    from ...solver.combinations.mirrored import MirroredShapes
     from ...solver.settings import FitOptions
     from ...solver.support.progress import Progress
 
@@ -160,7 +161,7 @@ def plan_combination(
         ends = shown([0.0] * count), shown([1.0] * count)
     with probed(obj, chosen, own) as shown:
         present = [shown(values[places].tolist()) for places in grid]
-    mesh = MirroredShapes(obj, [*ends, *alone])
+    mesh = completed(obj, [*ends, *alone])
     base, sculpted, *others = mesh.shapes
     shapes = np.stack(others).reshape(count, len(PLACES), *base.shape)
     task = Corrections(

@@ -34,7 +34,12 @@ from .operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, Q
 from .operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
-from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
+from .operators.inner_keys import (
+    QC3D_OT_add_inner_key,
+    QC3D_OT_go_through_sculpted,
+    QC3D_OT_keys_from_timeline,
+    QC3D_OT_remove_inner_key,
+)
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
 from .operators.open_demo import QC3D_OT_open_demo
@@ -45,6 +50,7 @@ from .ui import bake_list, menus, panel_combinations, panel_exports, panel_resul
 
 CLASSES = (
     choices.InnerKey,  # before the settings that contain it
+    properties.TimedKey,
     properties.ObjectSettings,
     QC3D_OT_prepare,
     preferences.QC3DPreferences,
@@ -78,6 +84,7 @@ CLASSES = (
     QC3D_OT_copy_report,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
+    QC3D_OT_keys_from_timeline,
     QC3D_OT_remove_inner_key,
     presets.QC3D_PT_presets,
     presets.QC3D_OT_add_preset,

@@ -10,7 +10,8 @@ import bpy
 
 from ...worker import engines
 from ..bake import jobs, progress_bar, timeline
-from ..bake.suggested_keys import sculpted_between
+from ..bake.suggested_keys import made_keys, sculpted_between
+from ..keys.leftovers import leftovers, sentence
 from ..kinds import keys_of, present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
@@ -58,6 +59,9 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         problem = checks.object_problem(obj)
         if obj is not None and problem is None:
             _draw_choices(layout, obj)
+            joined = sentence(leftovers(keys_of(obj), made_keys(keys_of(obj))))
+            if joined is not None:
+                draw_sentence(context, layout, joined)
             problem = checks.keys_problem(keys_of(obj), panel_keys(settings_of(obj)))
         job = jobs.current()
         if job is not None:

@@ -222,7 +222,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         }
         chain.request, chain.mirror_of = request.remembered(), ""
         chain.digests = tuple(digest(keys.key_blocks[name]) for name in request.keys)
-        chain.result = Summary.of_report(bake.report, steps.places, notes)
+        chain.result = Summary.of_report(bake.report, steps.places, len(request.keys), notes)
         record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
         _keep_maps(keys, record, plan, outcome, undo)
         bookkeeping.remember(obj, record, chain, bake.measures, made, undo)

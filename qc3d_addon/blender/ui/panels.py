@@ -133,11 +133,9 @@ def _draw_keys(layout: bpy.types.UILayout, obj: bpy.types.Object, settings: Obje
     for index, inner in enumerate(settings.via):
         row = column.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
-        if settings.via_timing != "even":
-            value = row.row(align=True)
-            value.ui_units_x = 3.0
-            value.prop(inner, "at" if settings.via_timing == "value" else "frame", text="")
         row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
+        if settings.via_timing != "even":  # in a row of its own, so that the name keeps its room
+            column.prop(inner, "at" if settings.via_timing == "value" else "frame")
     column.prop_search(settings, "last", keys, "key_blocks", icon='SHAPEKEY_DATA')
     if settings.via:
         column.row().prop(settings, "via_timing", expand=True)

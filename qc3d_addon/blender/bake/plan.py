@@ -61,10 +61,7 @@ class Plan:
 
     def locate(self) -> bpy.types.Object | None:
         """The object, even if it was renamed or changed; None if it was deleted."""
-        obj = bpy.data.objects.get(self.object_name)
-        if obj is not None and obj.session_uid == self.object_id:
-            return obj
-        return next((obj for obj in bpy.data.objects if obj.session_uid == self.object_id), None)
+        return located(self.object_name, self.object_id)
 
     def find_object(self) -> bpy.types.Object:
         """The object, after checking that the outcome can still be written to it.
@@ -86,6 +83,14 @@ class Plan:
         if not all(_same(pair, self.task.pairs[ends]) for ends, pair in pairs.items()):
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. Bake again.")
         return obj
+
+
+def located(name: str, session_uid: int) -> bpy.types.Object | None:
+    """The object that once had this name, even if it was renamed or changed; None if it was deleted."""
+    obj = bpy.data.objects.get(name)
+    if obj is not None and obj.session_uid == session_uid:
+        return obj
+    return next((obj for obj in bpy.data.objects if obj.session_uid == session_uid), None)
 
 
 def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:

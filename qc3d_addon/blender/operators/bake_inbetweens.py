@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
-from ..bake.plan import Plan, plan_bake, plan_one_more, request_again, write_bake
+from ..bake.plan import Plan, plan_bake, write_bake
+from ..bake.plan_again import plan_one_more, request_again
 from ..bake.together import objects_with_keys, plan_together, write_together
 from ..choices import TimedChoices
 from ..kinds import present

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import live_scrub
-from ..bake.plan import Plan, plan_preview
+from ..bake.plan import Plan
+from ..bake.plan_again import plan_preview
 from ..keys import straight
 from ..store import checks
 from .child_work import ChildWork

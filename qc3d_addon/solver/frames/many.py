@@ -20,6 +20,7 @@ from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import Ends, KeyPair, require_sizes
 from ..settings import FitOptions
+from ..support.memory import give_back
 from ..support.progress import Done
 from ..support.threads import alone, thread_count
 from .task import Outcome, Task, carry_out
@@ -209,9 +210,13 @@ def _beside_each_other(
         except BaseException as error:  # raised again where the run was started
             news.put(error)
 
+    def work_and_tidy_up(number: int) -> None:
+        work(number)
+        give_back()
+
     with ThreadPoolExecutor(at_once) as pool:
         for number in range(len(tasks)):
-            pool.submit(work, number)
+            pool.submit(work_and_tidy_up, number)
         try:
             ended = 0
             while ended < len(tasks):

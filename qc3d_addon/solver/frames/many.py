@@ -152,8 +152,8 @@ class Run:
         Notes
         -----
         Pairs with the same first key share a volume if their second key fits into its cube, which is larger than the
-        first key by a quarter. Its tetrahedra are as fine as those of a single bake, but others, so that frames differ
-        from those of a single bake about as much as with another seed.
+        first key by a quarter. Its tetrahedra are as fine as those of a single bake, but others, and so the frames are
+        those of a single bake up to rounding; docs/science/speed.md has the differences.
         """
         bases = _Bases(self.tasks)
         count, units = len(self.tasks), len(self.tasks) + _SHARE_OF_BASE * len(bases.shared)

@@ -5,6 +5,7 @@
 #   make test     everything: environment, ruff, mypy, pytest
 #   make quick    the solver's tests without the slow ones, for while you work: no Blender
 #   make assets   make the demo files again with the script that made them
+#   make site     the documentation as a site, in site/
 #   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
 #                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python
 #
@@ -18,7 +19,7 @@ endif
 VENV := .venv-$(VERSION)
 BIN := $(VENV)/bin
 
-.PHONY: demo test quick lint assets extension clean
+.PHONY: demo test quick lint assets site extension clean
 
 FIGURE := qc3d_addon/demo/figure.blend
 BEND := --object Arm --from Basis --to Bend
@@ -49,6 +50,10 @@ lint: $(VENV)/installed
 assets: $(VENV)/installed
 	$(BIN)/python assets/make_assets.py
 
+site: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 extension: $(VENV)/installed
 	$(BIN)/python tools/build_extension.py $(addprefix --platform ,$(PLATFORM)) \
 	    $(addprefix --extra-python ,$(EXTRA_PYTHON))
@@ -62,4 +67,4 @@ $(VENV)/installed: pyproject.toml blender_manifest.toml
 	touch $@
 
 clean:
-	rm -rf .venv-* .wheels demo dist
+	rm -rf .venv-* .wheels demo dist site

@@ -79,13 +79,16 @@ def shot(value: float, straight: bool, percentage: int, samples: int, folder: st
 def both(value: float, percentage: int, samples: int, folder: str) -> Image.Image:
     """The straight blend beside QC3D, with labels."""
     shots = [shot(value, straight, percentage, samples, folder) for straight in (True, False)]
-    picture = Image.fromarray(np.concatenate(shots, axis=1))
-    width, height = picture.size
-    font = ImageFont.load_default(size=height // 20)
+    halves = Image.fromarray(np.concatenate(shots, axis=1))
+    width, height = halves.size
+    top = height // 11
+    picture = Image.new("RGB", (width, height + top), (244, 244, 242))
+    picture.paste(halves, (0, top))
+    font = ImageFont.load_default(size=top * 5 // 9)
     draw = ImageDraw.Draw(picture)
     for number, label in enumerate(LABELS):
-        draw.text((width * (1 + 2 * number) // 4, height // 30), label, (30, 34, 38), font, anchor="ma")
-    draw.line([(width // 2, 0), (width // 2, height)], (120, 126, 130), 2)
+        draw.text((width * (1 + 2 * number) // 4, top // 2), label, (30, 34, 38), font, anchor="mm")
+    draw.line([(width // 2, 0), (width // 2, height + top)], (244, 244, 242), 3)
     return picture
 
 

@@ -21,7 +21,7 @@ from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import FitOptions, Quality
 from qc3d_addon.solver.support.progress import finish
 
-from .catalogue import Catalogue, Pair
+from .catalogue import Catalogue, Floats, Pair
 from .report import table
 
 _PAIRS = ("bar:straight:twist180", "wolf:bind:Gallop_0")
@@ -40,7 +40,7 @@ def main() -> None:
 
 def rows_of(pair: Pair) -> list[list[str]]:
     """The cells of one pair, a row for each quality."""
-    found: dict[Quality, dict[str, np.ndarray]] = {}
+    found: dict[Quality, dict[str, Floats]] = {}
     faces, first, second = pair.load()
     keys = KeyPair.checked(first, second, faces)
     for quality in get_args(Quality):

@@ -9,6 +9,7 @@ import bpy
 from ..kinds import present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from ..operators.bake_keys import QC3D_OT_bake_keys
+from ..operators.bug_report import QC3D_OT_copy_report
 from ..operators.open_demo import QC3D_OT_open_demo
 from ..operators.split_key import QC3D_OT_split_key
 
@@ -37,11 +38,12 @@ def _draw_animation(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
 
 
 def _draw_help(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """In *Help*: the demo."""
+    """In *Help*: the demo, and what a bug report needs."""
     layout = present(menu.layout)
     layout.separator()
     layout.operator_context = 'INVOKE_DEFAULT'  # it asks before unsaved changes are lost
     layout.operator(QC3D_OT_open_demo.bl_idname, icon='ARMATURE_DATA')
+    layout.operator(QC3D_OT_copy_report.bl_idname, text="Copy QC3D Report for a Bug", icon='COPYDOWN')
 
 
 _ENTRIES = (

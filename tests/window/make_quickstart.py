@@ -15,6 +15,8 @@ import sys
 import time
 from pathlib import Path
 
+from PIL import Image
+
 from .harness import Window, missing
 
 SCREEN = (1280, 800)
@@ -72,10 +74,14 @@ def bake_demo(window: Window, pictures: Path) -> None:
     window.push("qc3d.open_demo")
     window.wait_for("'Arm' in bpy.data.objects")
     time.sleep(SETTLE)
+    half_way(window, pictures / "before.png")
     window.open_sidebar()
     choose(window, pictures)
     bake(window, pictures)
     play(window, pictures)
+    half_way(window, pictures / "after.png")
+    beside(pictures)
+    heat_map(window, pictures)
 
 
 def choose(window: Window, pictures: Path) -> None:
@@ -108,6 +114,35 @@ def play(window: Window, pictures: Path) -> None:
     window.ask("bpy.context.scene.frame_set(39)")  # half-way, however fast this machine draws
     time.sleep(SETTLE)
     window.shoot(pictures / "quickstart-play.png", VIEW_AND_STATUS)
+
+
+def half_way(window: Window, path: Path) -> None:
+    """The figure while the bone Bend is half-way up, without the sidebar over it."""
+    window.ask("view()[1].spaces.active.show_region_ui = False")
+    window.ask("bpy.context.scene.frame_set(38)")
+    time.sleep(SETTLE)
+    window.shoot(path, (250, 140, 560, 480))
+
+
+def beside(pictures: Path) -> None:
+    """Before and after the bake in one picture."""
+    halves = [Image.open(pictures / f"{name}.png").convert("RGB") for name in ("before", "after")]
+    width, height = halves[0].size
+    both = Image.new("RGB", (2 * width + 4, height), (255, 255, 255))
+    for number, half in enumerate(halves):
+        both.paste(half, (number * (width + 4), 0))
+        (pictures / f"{('before', 'after')[number]}.png").unlink()
+    both.save(pictures / "on_the_key.png", optimize=True)
+
+
+def heat_map(window: Window, pictures: Path) -> None:
+    """The heat map of the bake, with its legend."""
+    window.open_sidebar()
+    window.push("qc3d.heat_map")
+    window.move(300, 650)
+    window.wait_for("jobs.current() is None and len(bpy.context.active_object.data.color_attributes) > 0")
+    time.sleep(SETTLE)
+    window.shoot(pictures / "heat_map.png", VIEW_AND_STATUS)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import sys
 from pathlib import Path
@@ -14,7 +16,7 @@ from ..settings import Quality
 # Measured by benchmarks/large.py, with a margin; docs/guide/limits.md has the figures.
 _MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0, "exact": 140.0}
 _KB_PER_VERTEX = 4.3  # for each pair: the factors of the surface's matrix, and the frames that are computed at once
-_KB_PER_VERTEX_EXACT = 66.0  # of one fit at a time, whose tetrahedra are as fine as the surface
+_KB_PER_VERTEX_EXACT = 85.0  # of one fit at a time, whose tetrahedra are as fine as the surface
 _BYTES_PER_POSITION = 110.0  # for each vertex in each frame: positions, measures, and temporary arrays
 _MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only counts crossings
 _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress
@@ -130,6 +132,15 @@ def machine_limit_mb() -> int:
     except (AttributeError, ValueError, OSError):  # this system does not tell
         return 0
     return int(_SHARE_OF_MACHINE * total / 2**20)
+
+
+def give_back() -> None:
+    """Give memory that was freed back to the system, where its C library can do that (glibc).
+
+    The library keeps it for later, but in pieces of the wrong sizes: after each of many tasks it would hold more.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def peak_memory_mb() -> float | None:

@@ -36,7 +36,8 @@ def build_figure() -> None:
     animate(rig)
     add_studio()
     bpy.context.view_layer.objects.active = bpy.data.objects["Arm"]
-    bpy.data.objects["Arm"].select_set(True)
+    for obj in bpy.data.objects:
+        obj.select_set(obj.name == "Arm")
 
 
 def add_mesh(name: str, points: Floats, faces: Ints, materials: tuple[str, ...], choice: Ints | None = None,

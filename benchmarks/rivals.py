@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import bz2
 import importlib
+import io
 import lzma
 import zlib
 from collections.abc import Callable
@@ -114,12 +115,12 @@ class Rivals:
         best: tuple[int, Array] | None = None
         for order in self._orders:
             rows = np.ascontiguousarray(self._moved[:, order])
-            with h5py.File("memory", "w", driver="core", backing_store=False) as file:
-                # The components first: neighbors in the array are then neighbors on the mesh.
-                data = np.ascontiguousarray(rows.transpose(0, 2, 1))
-                dataset = file.create_dataset("x", data=data, chunks=data.shape, **choice)
-                file.flush()
-                restored, size = np.asarray(dataset[()]), int(dataset.id.get_storage_size())
+            # The components first: neighbors in the array are then neighbors on the mesh.
+            data, memory = np.ascontiguousarray(rows.transpose(0, 2, 1)), io.BytesIO()
+            with h5py.File(memory, "w") as file:
+                file.create_dataset("x", data=data, chunks=data.shape, **choice)
+            with h5py.File(memory, "r") as file:  # what was written is read from the cache until then
+                restored, size = np.asarray(file["x"][()]), int(file["x"].id.get_storage_size())
             back = np.empty_like(rows)
             back[:, order] = restored.transpose(0, 2, 1)
             if best is None or size < best[0]:

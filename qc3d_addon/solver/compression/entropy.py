@@ -122,7 +122,8 @@ def _content(folded: Folded, pack: int) -> bytes:
     packed = (padded.reshape(-1, together) * values ** np.arange(together)).sum(axis=1).astype(np.uint8)
     beyond = folded[folded >= last] - last
     full = np.ascontiguousarray(beyond[beyond >= 255]).view(np.uint8).reshape(-1, 8)[:, :_FULL]
-    return packed.tobytes() + np.minimum(beyond, 255).astype(np.uint8).tobytes() + bytes(full.T.tobytes())
+    layers = (packed, np.minimum(beyond, 255).astype(np.uint8), full.T)
+    return b"".join(layer.tobytes() for layer in layers)
 
 
 def _read(way: int, data: bytes, count: int) -> Folded:

@@ -75,9 +75,7 @@ def _small_frames(frames: Floats, faces: Ints, error: float) -> Small:
     return finish(small_frames(frames, faces, error))
 
 
-def _baked(
-    path: Path, through: Sequence[str], between: int
-) -> tuple[Floats, Ints, Settings, Ints]:
+def _baked(path: Path, through: Sequence[str], between: int) -> tuple[Floats, Ints, Settings, Ints]:
     pairs = read_pairs(path, through)
     times = evenly_spaced((between + 1) * (len(through) - 1) - 1)
     task = Task(pairs, tuple(through), times=times)

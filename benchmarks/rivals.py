@@ -131,9 +131,7 @@ class Rivals:
     def _draco(self, module: Any, error: float) -> int:  # noqa: ANN401 - a library
         """Each displacement as a cloud of points, in the fewest bits that are near enough."""
         for bits in range(1, 28):
-            data = [
-                module.encode(rows.astype(np.float32), None, bits, 10, preserve_order=True) for rows in self._moved
-            ]
+            data = [module.encode(rows.astype(np.float32), None, bits, 10, preserve_order=True) for rows in self._moved]
             restored = np.stack([np.asarray(module.decode(each).points, dtype=np.float64) for each in data])
             if self._error(restored) <= error:
                 return sum(map(len, data))

@@ -75,9 +75,7 @@ def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme:
 
 
 @pytest.mark.parametrize("amount", [["--error", "0.01"], ["--error", "1e-4"], ["--size", "900"]])
-def test_the_smallest(
-    source: Path, tmp_path: Path, amount: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_smallest(source: Path, tmp_path: Path, amount: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     file, report, output = tmp_path / "map.qc3d", tmp_path / "report.json", tmp_path / "restored.npz"
     command = ["compress", str(source), *amount, "--output", str(file), "--report", str(report)]
     assert main.main(command) == 0
@@ -211,9 +209,7 @@ class TestErrors:
         assert "is not possible" in said
         assert not (tmp_path / "a.qc3d").exists()
 
-    def test_the_report_is_another_file(
-        self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_the_report_is_another_file(self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         outputs = ("--output", tmp_path / "a", "--report", tmp_path / "a")
         assert "named twice" in self.said(capsys, "compress", source, "--modes", 2, *outputs)
         outputs = ("--output", tmp_path / "a", "--report", tmp_path / "none" / "r.json")

@@ -169,9 +169,7 @@ def _huffman(content: bytes) -> bytes:
 
 def _filters(literal_bits: int) -> list[dict[str, int]]:
     preset = 9 | lzma.PRESET_EXTREME
-    return [
-        {"id": lzma.FILTER_LZMA1, "preset": preset, "dict_size": _DICTIONARY, "lc": literal_bits, "lp": 0, "pb": 0}
-    ]
+    return [{"id": lzma.FILTER_LZMA1, "preset": preset, "dict_size": _DICTIONARY, "lc": literal_bits, "lp": 0, "pb": 0}]
 
 
 def _shortened(content: bytes, literal_bits: int) -> bytes:

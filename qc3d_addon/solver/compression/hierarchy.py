@@ -10,8 +10,11 @@ on which all others depend, are told more exactly.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
@@ -24,6 +27,8 @@ _NUGGET = 1e-6  # makes coincident points harmless
 _AT_ONCE = 1 << 14  # points whose systems are solved at once: 30 MB
 _CROWDED = 0.9  # of the points are not finer than the level at which steps stop growing
 _JITTER_BITS = 5
+
+Number = TypeVar("Number", np.int64, np.float64)
 
 
 class Hierarchy:
@@ -43,11 +48,11 @@ class Hierarchy:
         self.along: Ints = np.argsort(along, kind="stable")
         self._crowded = int(np.quantile(self.levels, _CROWDED)) if len(points) else 0
         places = _apart(lattice)
-        self._steps: list[tuple[int, Ints, Ints, Floats]] = []
+        self._steps: list[tuple[int, Ints, csr_array]] = []
         for level in range(int(self.levels.max(initial=-1)) + 1):
             known, wanted = np.flatnonzero(self.levels < level), np.flatnonzero(self.levels == level)
             if len(wanted):
-                self._steps.append((level, wanted, *_kriging(places, known, wanted)))
+                self._steps.append((level, wanted, _kriging(places, known, wanted)))
 
     def numbers(self, field: Floats, step: float, growth: float, free: NDArray[np.bool_], threshold: float) -> Ints:
         """(F, n, 3) whole numbers for fields (F, n, 3); see ``field`` for step and growth.
@@ -59,16 +64,17 @@ class Hierarchy:
         threshold : float
             In steps, 0.5 to 1: differences that are smaller are told as 0, which costs least.
         """
-        numbers = np.zeros(field.shape, dtype=np.int64)
-        made = np.zeros_like(field)
-        for level, wanted, neighbors, weights in self._steps:
+        wide, mask = _beside(field), np.tile(free, len(field))
+        numbers = np.zeros(wide.shape, dtype=np.int64)
+        made = np.zeros_like(wide)
+        for level, wanted, expectation in self._steps:
             size = self._step(step, growth, level)
-            expected = _expected(made, neighbors, weights)
-            missed = (field[:, wanted] - expected) / size
-            told = np.sign(missed) * np.floor(np.abs(missed) + (1.0 - threshold)) * free[wanted]
-            numbers[:, wanted] = told
-            made[:, wanted] = (expected + size * told) * free[wanted]
-        return numbers
+            expected = expectation @ made
+            missed = (wide[wanted] - expected) / size
+            told = np.sign(missed) * np.floor(np.abs(missed) + (1.0 - threshold)) * mask[wanted]
+            numbers[wanted] = told
+            made[wanted] = (expected + size * told) * mask[wanted]
+        return _above(numbers)
 
     def field(self, numbers: Ints, step: float, growth: float, free: NDArray[np.bool_]) -> Floats:
         """(F, n, 3) what whole numbers (F, n, 3) mean.
@@ -80,11 +86,11 @@ class Hierarchy:
         growth : float
             From one level to the next finer one the steps grow by this factor.
         """
-        made = np.zeros(numbers.shape)
-        for level, wanted, neighbors, weights in self._steps:
-            expected = _expected(made, neighbors, weights)
-            made[:, wanted] = (expected + self._step(step, growth, level) * numbers[:, wanted]) * free[wanted]
-        return made
+        wide, mask = _beside(numbers), np.tile(free, len(numbers))
+        made = np.zeros(wide.shape)
+        for level, wanted, expectation in self._steps:
+            made[wanted] = (expectation @ made + self._step(step, growth, level) * wide[wanted]) * mask[wanted]
+        return _above(made)
 
     def _step(self, step: float, growth: float, level: int) -> float:
         return float(step * growth ** min(level - self._crowded, 0))
@@ -100,20 +106,18 @@ def _apart(lattice: NDArray[np.int64]) -> Floats:
     return np.asarray(((lattice << _JITTER_BITS) + jitter).astype(np.float64))
 
 
-def _kriging(points: Floats, known: Ints, wanted: Ints) -> tuple[Ints, Floats]:
-    """The neighbors (w, k) of wanted points among known ones, and their weights (w, k), which sum to 1."""
-    count = min(_NEIGHBORS, len(known))
+def _kriging(points: Floats, known: Ints, wanted: Ints) -> csr_array:
+    """(w, n) sparse: what wanted points are expected to have, as means of what known ones have; 0 where none is."""
+    shape, count = (len(wanted), len(points)), min(_NEIGHBORS, len(known))
     if not count:
-        return np.zeros((len(wanted), 0), dtype=np.int64), np.zeros((len(wanted), 0))
+        return csr_array(shape)
     near = np.reshape(cKDTree(points[known]).query(points[wanted], k=count)[1], (len(wanted), count))
     neighbors = known[near]
-    if count < _FEWEST:
-        return neighbors, np.full(neighbors.shape, 1.0 / count)
-    weights = np.empty(neighbors.shape)
-    for start in range(0, len(wanted), _AT_ONCE):
+    weights = np.full(neighbors.shape, 1.0 / count)
+    for start in range(0, len(wanted) if count >= _FEWEST else 0, _AT_ONCE):
         some = slice(start, start + _AT_ONCE)
         weights[some] = _weights(points[neighbors[some]] - points[wanted[some], None])
-    return neighbors, weights
+    return csr_array((weights.ravel(), neighbors.ravel(), np.arange(0, weights.size + 1, count)), shape)
 
 
 def _weights(offsets: Floats) -> Floats:
@@ -136,6 +140,11 @@ def _weights(offsets: Floats) -> Floats:
     return np.asarray(np.linalg.solve(system, sides)[:, :count, 0])
 
 
-def _expected(made: Floats, neighbors: Ints, weights: Floats) -> Floats:
-    """(F, w, 3) what is expected of fields (F, n, 3) that are known at the neighbors (w, k)."""
-    return np.asarray(np.einsum("wk,fwkc->fwc", weights, made[:, neighbors]))
+def _beside(fields: NDArray[Number]) -> NDArray[Number]:
+    """(n, 3 F) fields (F, n, 3) side by side."""
+    return np.ascontiguousarray(fields.transpose(1, 0, 2)).reshape(fields.shape[1], -1)
+
+
+def _above(wide: NDArray[Number]) -> NDArray[Number]:
+    """(F, n, 3) fields that were side by side."""
+    return np.ascontiguousarray(wide.reshape(len(wide), -1, 3).transpose(1, 0, 2))

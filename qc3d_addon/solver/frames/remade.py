@@ -35,7 +35,7 @@ T = TypeVar("T")
 _SHARE = 0.9  # of the error, for the keys: frames between them may miss a little more than they do
 _TOLERANCE = 0.02  # of the error, between the frames that were made again here and there
 _TIDY = 0.05  # of the error: what is less is meant to be nothing
-_MOST_KEYS = 64
+_MOST_KEYS, _MOST_FRAMES, _MOST_SECONDS = 64, 10_000, 600.0  # a reader can be made to bake so much
 _MOST_TEXT = 20_000
 _DAMAGED = "The settings of the frames make no sense; the file is damaged."
 
@@ -77,9 +77,7 @@ class Settings:
             content = json.loads(text)
             at = tuple(content.pop("at"))
             times = tuple(map(float, content.pop("times", ())))
-            found = cls(
-                at, times, FitOptions(**content.pop("fit", {})), FrameOptions(**content.pop("frame", {}))
-            )
+            found = cls(at, times, FitOptions(**content.pop("fit", {})), FrameOptions(**content.pop("frame", {})))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
             raise InputError(_DAMAGED) from error
         numbers = [type(number) is int for number in at]
@@ -124,6 +122,9 @@ def remade(source: Source, keys: Floats, settings: Settings, polygons: Ints | No
     QC3DError
         If the settings do not fit the keys, or the bake needs too much memory or cannot be made.
     """
+    limit = settings.fit_options.mesh_time_limit
+    if len(settings.at) > _MOST_KEYS + 1 or count > _MOST_FRAMES or limit > _MOST_SECONDS:
+        raise InputError("These are more frames or keys than are baked again; compress them by the scheme stored.")
     if settings.at[-1] != count or len(settings.at) != len(keys) + 1 or len(settings.times) not in (0, count + 1):
         raise InputError(_DAMAGED)
     names = tuple(str(number) for number in range(len(settings.at)))
@@ -185,9 +186,7 @@ def restored(data: bytes, source: Source, polygons: Ints | None) -> Steps[Floats
     return np.asarray(frames + packed.field.displacements(space))
 
 
-def _made_again(
-    source: Source, frames: Floats, error: float, settings: Settings, polygons: Ints | None
-) -> Work:
+def _made_again(source: Source, frames: Floats, error: float, settings: Settings, polygons: Ints | None) -> Work:
     """A file of keys and what baking again with them misses; its way is ``remade`` where that is nothing."""
     space, unit = space_of(source, "fixed"), diagonal_of(source.points)
     moved = frames[list(settings.at[1:])] - source.points

@@ -14,7 +14,7 @@ from qc3d_addon.solver.compression.compact import from_bytes, to_bytes
 from qc3d_addon.solver.compression.files import Source
 from qc3d_addon.solver.compression.pack import small_frames, unpacked
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.frames.remade import Settings, restored, small_bake
+from qc3d_addon.solver.frames.remade import Settings, remade, restored, small_bake
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.settings import FitOptions, FrameOptions
 from qc3d_addon.solver.support.progress import finish
@@ -112,6 +112,21 @@ class TestBakes:
         other = replace(packed, remaking=replace(packed.remaking, check=packed.remaking.check + 1e-3))
         with pytest.raises(InputError, match="come out differently"):
             finish(restored(to_bytes(source, space, other), source, POLYGONS))
+
+    @pytest.mark.parametrize(
+        "settings",
+        [
+            Settings((0, 20_000)),
+            Settings(tuple(range(100))),
+            Settings((0, 8), fit_options=FitOptions(mesh_time_limit=1e9)),
+            Settings((0, 7)),
+            Settings((0, 8), (0.0, 1.0)),
+        ],
+    )
+    def test_files_that_would_take_hours_or_do_not_fit(self, bake: tuple[Task, Floats], settings: Settings) -> None:
+        source = Source("frames", bake[1][0], FACES)
+        with pytest.raises(InputError):
+            finish(remade(source, bake[1][-1:], settings, None, settings.at[-1] if settings.at[-1] > 8 else 8))
 
     def test_keys_that_nothing_can_be_made_of_are_stored(self, bake: tuple[Task, Floats]) -> None:
         _, frames = bake

@@ -5,6 +5,7 @@
 #   make test     everything: environment, ruff, mypy, pytest
 #   make quick    the solver's tests without the slow ones, for while you work: no Blender
 #   make assets   make the demo files again with the script that made them
+#   make site     the documentation as a site, in site/
 #   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
 #                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python
 #
@@ -18,19 +19,23 @@ endif
 VENV := .venv-$(VERSION)
 BIN := $(VENV)/bin
 
-.PHONY: demo test quick lint assets extension clean
+.PHONY: demo test quick lint assets site extension clean
 
-KEYS := --object Arm --from Basis --to "Bend and twist"
+FIGURE := qc3d_addon/demo/figure.blend
+BEND := --object Arm --from Basis --to Bend
+BLINK := --object Lids --from Basis --to Blink.L
 
 demo: $(VENV)/installed
 	rm -rf demo && mkdir demo
-	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 \
-	    --output demo/limb.blend --report demo/limb.json
-	$(BIN)/qc3d bake assets/limb.blend $(KEYS) --frames 5 --keyframes 1 49 --mode linear \
-	    --output demo/limb_linear.blend --report demo/limb_linear.json
-	$(BIN)/python tools/contact_sheet.py "mode linear=demo/limb_linear.blend" "mode natural=demo/limb.blend" --straight \
-	    $(KEYS) --output demo/limb.png
-	@echo "Look at demo/limb.png, open demo/limb.blend in Blender and press play, read demo/limb.json."
+	$(BIN)/qc3d bake $(FIGURE) $(BEND) --frames 5 --mode linear --output demo/linear.blend
+	$(BIN)/qc3d bake $(FIGURE) $(BEND) --frames 5 --output demo/arm.blend --report demo/arm.json
+	$(BIN)/qc3d bake demo/arm.blend $(BLINK) --frames 5 --colliders Eyes --output demo/figure.blend --report demo/lids.json
+	$(BIN)/python tools/contact_sheet.py "mode linear=demo/linear.blend" "mode natural=demo/figure.blend" --straight \
+	    $(BEND) --view front --output demo/arm.png
+	$(BIN)/python tools/contact_sheet.py "mode natural=demo/figure.blend" --straight $(BLINK) --scenery Eye.L \
+	    --output demo/lids.png
+	rm demo/linear.blend demo/arm.blend
+	@echo "Look at demo/arm.png and demo/lids.png, open demo/figure.blend in Blender and press play, read demo/arm.json."
 
 test: $(VENV)/installed lint
 	$(BIN)/python -m pytest
@@ -45,6 +50,10 @@ lint: $(VENV)/installed
 assets: $(VENV)/installed
 	$(BIN)/python assets/make_assets.py
 
+site: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 extension: $(VENV)/installed
 	$(BIN)/python tools/build_extension.py $(addprefix --platform ,$(PLATFORM)) \
 	    $(addprefix --extra-python ,$(EXTRA_PYTHON))
@@ -58,4 +67,4 @@ $(VENV)/installed: pyproject.toml blender_manifest.toml
 	touch $@
 
 clean:
-	rm -rf .venv-* .wheels demo dist
+	rm -rf .venv-* .wheels demo dist site

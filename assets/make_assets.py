@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the demo files from Blender's own primitives, the same every time: python assets/make_assets.py [FOLDER].
+"""Make the demo files, the same every time: python assets/make_assets.py [FOLDER].
 
-``limb.blend`` is a mannequin's arm on a chest that stays still; ``suzanne.blend`` is Suzanne with expressions;
-``lid.blend`` is a lid that closes over an eyeball, which is in the collection "Eyeball". The shipped files were saved
-by Blender 4.5, so that 4.5 and everything after it opens them.
+``figure.blend``, which ships inside the add-on, is a bust whose rig drives the keys of its face, lids and arm;
+``limb.blend`` is an arm with a hand; ``suzanne.blend`` is Suzanne with expressions; ``lid.blend`` is a lid that closes
+over an eyeball, which is in the collection "Eyeball". The shipped files were saved by Blender 4.5, so that 4.5 and
+everything after it opens them.
 """
 
 from __future__ import annotations
@@ -14,56 +15,42 @@ from collections.abc import Callable
 from pathlib import Path
 
 import bpy
+import figure_body
 import numpy as np
-from numpy.typing import NDArray
+from clay import Floats
+from figure import add_mesh, build_figure
+from motions import rise, swept, turned
 
-Floats = NDArray[np.float64]
 Deformation = Callable[[Floats], Floats]
+HERE = Path(__file__).parent
 
 
-def main(folder: Path) -> None:
-    """Write the files into ``folder``."""
-    for name, build in (("limb", build_limb), ("suzanne", build_suzanne), ("lid", build_lid)):
+def main(folder: Path | None) -> None:
+    """Write the files into ``folder``, or where they are shipped."""
+    for name, (build, shipped) in FILES.items():
         bpy.ops.wm.read_factory_settings(use_empty=True)
         build()
-        path = folder / f"{name}.blend"
+        path = (folder or shipped) / f"{name}.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
         print(f"{path}: {path.stat().st_size / 1024:.0f} KiB")
 
 
 def build_limb() -> None:
-    """An arm along the x axis, in meters: chest, upper arm, forearm, and a hand with a thumb, as one closed surface."""
-    pieces = [
-        _ball((-0.42, 0.0, -0.02), (0.48, 0.36, 0.62)),
-        _ball((0.0, 0.0, 0.25), (0.4, 0.36, 0.38)),
-        _ball((1.3, 0.0, 0.25), (0.27, 0.25, 0.25)),
-        _ball((2.3, 0.0, 0.25), (0.18, 0.16, 0.18)),
-        _ball((2.66, 0.0, 0.27), (0.4, 0.13, 0.27)),
-        _tapered((0.0, 0.0, 0.25), (1.3, 0.0, 0.25), 0.34, 0.25),
-        _tapered((1.3, 0.0, 0.25), (2.3, 0.0, 0.25), 0.27, 0.17),
-        _tapered((2.4, 0.0, 0.3), (2.62, 0.0, 0.68), 0.12, 0.09),
-        _ball((2.62, 0.0, 0.68), (0.1, 0.09, 0.1)),
-    ]
-    arm = _joined(pieces, "Arm")
-    remesh = arm.modifiers.new("Remesh", "REMESH")
-    remesh.mode = "VOXEL"
-    remesh.voxel_size = 0.05
-    smooth = arm.modifiers.new("Smooth", "SMOOTH")
-    smooth.factor = 0.5
-    smooth.iterations = 8
-    _apply_modifiers(arm)
+    """The figure's arm alone, 3.5 times as large, along x: shoulder, elbow, and a hand with fingers."""
+    points, faces = figure_body.arm(0.0226)
+    size, middle = 3.5, np.array([0.4, 0.0, 0.0])
 
-    axis = np.array([0.0, 0.0, 0.25])
-    bend = np.radians(90.0)
-    twist = np.radians(120.0)
-    _add_shapes(
-        arm,
-        {
-            "Bend 90": lambda points: _swept(points, axis, bend, 0.0),
-            "Twist 120": lambda points: _swept(points, axis, 0.0, twist),
-            "Bend and twist": lambda points: _swept(points, axis, bend, twist),
-        },
-    )
+    def placed(shape: Floats) -> Floats:
+        return np.asarray((shape - middle) * size + [1.0, 0.0, 0.25])
+
+    origin, bend, twist = (0.0, 0.0, 0.0), np.radians(90.0), np.radians(120.0)
+    bends, twists = figure_body.ELBOW, (0.18, 0.95)
+    keys = {
+        "Bend 90": placed(swept(points, origin, bend, bends)),
+        "Twist 120": placed(swept(points, origin, 0.0, bends, twist, twists)),
+        "Bend and twist": placed(swept(points, origin, bend, bends, twist, twists)),
+    }
+    bpy.context.view_layer.objects.active = add_mesh("Arm", placed(points), faces, ("Skin plain",), keys=keys)
 
 
 def build_suzanne() -> None:
@@ -76,18 +63,18 @@ def build_suzanne() -> None:
     _apply_modifiers(suzanne)
 
     def jaw(points: Floats) -> Floats:
-        below = _rise(-points[:, 2], 0.34, 0.62) * _rise(-points[:, 1], 0.1, 0.5)
-        return _turned(points, (0.0, -0.1, -0.3), (1.0, 0.0, 0.0), np.radians(28.0) * below)
+        below = rise(-points[:, 2], 0.34, 0.62) * rise(-points[:, 1], 0.1, 0.5)
+        return turned(points, (0.0, -0.1, -0.3), (1.0, 0.0, 0.0), np.radians(28.0) * below)
 
     def ears(points: Floats) -> Floats:
         for side in (-1.0, 1.0):
-            outside = _rise(side * points[:, 0], 0.75, 1.05)
-            points = _turned(points, (side * 0.8, 0.1, 0.2), (0.0, 0.0, 1.0), side * np.radians(50.0) * outside)
+            outside = rise(side * points[:, 0], 0.75, 1.05)
+            points = turned(points, (side * 0.8, 0.1, 0.2), (0.0, 0.0, 1.0), side * np.radians(50.0) * outside)
         return points
 
     def brows(points: Floats) -> Floats:
-        front = _rise(-points[:, 1], 0.25, 0.55) * _rise(points[:, 2], 0.42, 0.7)
-        return _turned(points, (0.0, 0.1, 0.3), (1.0, 0.0, 0.0), -np.radians(14.0) * front)
+        front = rise(-points[:, 1], 0.25, 0.55) * rise(points[:, 2], 0.42, 0.7)
+        return turned(points, (0.0, 0.1, 0.3), (1.0, 0.0, 0.0), -np.radians(14.0) * front)
 
     _add_shapes(
         suzanne,
@@ -143,41 +130,6 @@ def _bulging(rays: Floats) -> Floats:
     return np.asarray(rays * (1.0 + 0.25 * np.maximum(1.0 - (angle / 30.0) ** 2, 0.0) ** 2)[:, None])
 
 
-def _ball(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> bpy.types.Object:
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16, location=centre, scale=radii)
-    return bpy.context.object
-
-
-def _tapered(
-    start: tuple[float, float, float], end: tuple[float, float, float], radius1: float, radius2: float
-) -> bpy.types.Object:
-    """A truncated cone between two points."""
-    from mathutils import Vector
-
-    along = Vector(end) - Vector(start)
-    bpy.ops.mesh.primitive_cone_add(
-        vertices=32,
-        radius1=radius1,
-        radius2=radius2,
-        depth=along.length,
-        location=(Vector(start) + Vector(end)) / 2.0,
-        rotation=along.to_track_quat("Z", "Y").to_euler(),
-    )
-    return bpy.context.object
-
-
-def _joined(pieces: list[bpy.types.Object], name: str) -> bpy.types.Object:
-    bpy.ops.object.select_all(action="DESELECT")
-    for piece in pieces:
-        piece.select_set(True)
-    bpy.context.view_layer.objects.active = pieces[0]
-    bpy.ops.object.join()
-    bpy.ops.object.transform_apply(location=True, rotation=True, scale=True)
-    joined = bpy.context.object
-    joined.name = joined.data.name = name
-    return joined
-
-
 def _apply_modifiers(obj: bpy.types.Object) -> None:
     for name in [modifier.name for modifier in obj.modifiers]:
         bpy.ops.object.modifier_apply(modifier=name)
@@ -198,51 +150,12 @@ def _add_shapes(obj: bpy.types.Object, shapes: dict[str, Deformation]) -> None:
     print(f"{obj.name}: {len(points)} vertices, {still.mean():.0%} of them still in every key")
 
 
-def _swept(points: Floats, origin: Floats, bend: float, twist: float) -> Floats:
-    """Bend an arm along x upwards at its elbow and twist it about itself, without thinning or folding it.
-
-    Each cross-section moves rigidly along the bent axis; sections before the elbow's region only twist, and what lies
-    before the twist's region, the chest and the shoulder, does not move at all.
-    """
-    stations = np.linspace(0.0, 4.0, 4001)
-    angles = bend * _rise(stations, 0.85, 1.85)
-    steps = 0.5 * np.diff(stations) * np.stack([np.cos(angles[1:]) + np.cos(angles[:-1]),
-                                                np.sin(angles[1:]) + np.sin(angles[:-1])])  # fmt: skip
-    along, up = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
-
-    moved = points.copy()
-    arm = points[:, 0] > 0.45
-    x, y, z = (points[arm] - origin).T
-    turn = twist * _rise(x, 0.45, 2.35)
-    y, z = np.cos(turn) * y - np.sin(turn) * z, np.sin(turn) * y + np.cos(turn) * z
-    angle = bend * _rise(x, 0.85, 1.85)
-    axis_x, axis_z = np.interp(x, stations, along), np.interp(x, stations, up)
-    moved[arm] = origin + np.stack([axis_x - np.sin(angle) * z, y, axis_z + np.cos(angle) * z], axis=1)
-    return moved
-
-
-def _turned(
-    points: Floats, pivot: tuple[float, float, float], axis: tuple[float, float, float], angles: Floats
-) -> Floats:
-    """Turn each point about the same line by an angle of its own; those of angle 0 stay exactly where they are."""
-    turned = points.copy()
-    moving = angles != 0.0
-    offset, direction = points[moving] - np.array(pivot), np.array(axis)
-    cosine, sine = np.cos(angles[moving, None]), np.sin(angles[moving, None])
-    turned[moving] = (
-        np.array(pivot)
-        + cosine * offset
-        + sine * np.cross(direction, offset)
-        + (1.0 - cosine) * (offset @ direction)[:, None] * direction
-    )
-    return turned
-
-
-def _rise(values: Floats, start: float, end: float) -> Floats:
-    """From 0 below ``start`` to 1 above ``end``, with two continuous derivatives."""
-    t = np.clip((values - start) / (end - start), 0.0, 1.0)
-    return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
-
+FILES: dict[str, tuple[Callable[[], None], Path]] = {
+    "limb": (build_limb, HERE),
+    "suzanne": (build_suzanne, HERE),
+    "lid": (build_lid, HERE),
+    "figure": (build_figure, HERE.parent / "qc3d_addon" / "demo"),
+}
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)

@@ -26,10 +26,11 @@ from qc3d_addon.solver.compression.files import Packer, Source
 from qc3d_addon.solver.compression.pack import Small, diagonal_of, small_frames, small_maps
 from qc3d_addon.solver.compression.search import Compressor
 from qc3d_addon.solver.errors import ReconstructionError
-from qc3d_addon.solver.frames.bake import evenly_spaced
+from qc3d_addon.solver.frames.key_times import KeyTimes
 from qc3d_addon.solver.frames.remade import Settings, small_bake
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.keys.files import read_pairs
+from qc3d_addon.solver.settings import FrameOptions
 from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
@@ -77,7 +78,7 @@ def _small_frames(frames: Floats, faces: Ints, error: float) -> Small:
 
 def _baked(path: Path, through: Sequence[str], between: int) -> tuple[Floats, Ints, Settings, Ints]:
     pairs = read_pairs(path, through)
-    times = evenly_spaced((between + 1) * (len(through) - 1) - 1)
+    times = KeyTimes.of(FrameOptions(), len(through) - 1).between(between)
     task = Task(pairs, tuple(through), times=times)
     bake = finish(carry_out(task)).bake
     assert bake is not None

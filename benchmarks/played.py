@@ -91,7 +91,7 @@ def played(pair: Pair, faces: Ints, first: Floats, second: Floats, times: Floats
         key.value = 0.0
         set_key_coordinates(key, shape.astype(np.float32))
     options = FitOptions(extra_turns=pair.extra_turns)
-    result = bake_object(obj, BakeRequest(("Basis", "Up"), fit_options=options, play_on=control))
+    result = bake_object(obj, BakeRequest(("Basis", "Up"), fit_options=options, play_on=control, more=True))
     shapes = []
     for time in times.tolist():
         if control == "key":

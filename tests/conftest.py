@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,22 @@ DATA = Path(os.environ.get("QC3D_DATA") or REPOSITORY.parent / "shared" / "data"
 # A busy machine is no failure; and continuous integration tries the same examples every time.
 settings.register_profile("qc3d", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("qc3d")
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    _status.append(int(exitstatus))
+
+
+def _end() -> None:
+    """End here: Blender's module tears down its libraries after Python's end, and once waited for itself there."""
+    if _status and "bpy" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_status[-1])
+
+
+_status: list[int] = []
+atexit.register(_end)  # what others register later is done before
 
 
 def pytest_report_header() -> str:

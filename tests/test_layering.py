@@ -33,7 +33,7 @@ SOLVER_FLOORS = (
 ADDON_FLOORS = (("solver",), ("worker",), ("blender",), ("cli",), ("start",), ("__main__",))
 BLENDER_FLOORS = (
     ("kinds",),
-    ("compat", "native_files", "preferences"),
+    ("compat", "native_files", "preferences", "translations"),
     ("store",),
     ("keys",),
     ("heat_map",),

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Build the extension packages, one for each platform, including the wheels that Blender's Python lacks.
 
-The wheels are pinned in ``tools/extension_wheels.sha256`` and downloaded once into a cache. Every package is read back,
-compared with what it should contain, and checked by Blender's own validator; a package that fails is removed.
+The wheels are pinned in ``tools/extension_wheels.sha256``, downloaded once into a cache, and packed without tests.
+Every package is read back, compared with what it should contain, and checked by Blender's own validator; a package
+that fails is removed.
 
     python tools/build_extension.py [--platform linux-x64] [--extra-python 3.14]
 """
@@ -21,6 +22,8 @@ import tomllib
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+
+from slim_wheel import slimmed
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PINS = Path(__file__).with_name("extension_wheels.sha256")
@@ -105,15 +108,17 @@ def main(argv: list[str] | None = None) -> int:
 def build(platform: str, folder: Path, extra_pythons: list[str]) -> Path:
     """Download the wheels of one platform, write its package into ``folder`` and check it; raises BuildError."""
     wheels = chosen(read_pins(), platform, extra_pythons)
-    files = [fetch(wheel) for wheel in wheels]
+    fetched = [fetch(wheel) for wheel in wheels]
     version = tomllib.loads((REPOSITORY / MANIFEST).read_text(encoding="utf-8"))["version"]
     kind = "".join(f"-python{python}" for python in extra_pythons)
     path = folder / f"qc3d-{version}{kind}-{platform}.zip"
     folder.mkdir(parents=True, exist_ok=True)
     unchecked = path.with_name(f".{path.name}")
     try:
-        write(unchecked, platform, files)
-        check(unchecked, platform, wheels)
+        with tempfile.TemporaryDirectory() as slim:
+            files = [slimmed(wheel, Path(slim)) for wheel in fetched]
+            write(unchecked, platform, files)
+            check(unchecked, platform, files)
         validate(unchecked)
         unchecked.replace(path)
     finally:
@@ -143,13 +148,17 @@ def fetch(wheel: Wheel) -> Path:
         package, version, python, abi, platform = wheel.parts
         tags = [f"--platform={tag}" for tag in platform.split(".")]
         only = ["--no-deps", "--only-binary=:all:", "--require-hashes", "--implementation=cp", "--retries=1"]
-        with tempfile.TemporaryDirectory() as folder:
+        CACHE.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=CACHE) as folder:  # another build may download the same wheel meanwhile
             requirement = Path(folder) / "requirement.txt"
             requirement.write_text(f"{package}=={version} --hash=sha256:{wheel.sha256}\n", encoding="utf-8")
             command = [sys.executable, "-m", "pip", "download", "--quiet", *only, f"--python-version={python[2:]}"]
-            command += [f"--abi={abi}", *tags, f"--dest={CACHE}", f"--requirement={requirement}"]
+            command += [f"--abi={abi}", *tags, f"--dest={folder}", f"--requirement={requirement}"]
             run = subprocess.run(command, capture_output=True, text=True)
-        if run.returncode != 0 or not path.exists():
+            brought = Path(folder) / wheel.file
+            if run.returncode == 0 and brought.exists():
+                brought.replace(path)
+        if not path.exists():
             reason = (run.stderr.strip() or "pip brought another file").splitlines()[-1]
             if re.search(r"connection|timed out|resolution", run.stderr, re.IGNORECASE):
                 raise UnreachableError(f"{wheel.file} cannot be downloaded: the package registry cannot be reached.")
@@ -196,9 +205,9 @@ def licence_texts(wheel: Path) -> dict[str, bytes]:
         return {str(path): archive.read(str(path)) for path in found}
 
 
-def check(path: Path, platform: str, wheels: list[Wheel]) -> None:
+def check(path: Path, platform: str, wheels: list[Path]) -> None:
     """Compare a package with what it should contain; raises BuildError if anything differs."""
-    expected = {f"wheels/{wheel.file}": wheel.sha256 for wheel in wheels}
+    expected = {f"wheels/{wheel.name}": hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in wheels}
     with zipfile.ZipFile(path) as archive:
         broken = archive.testzip()
         if broken is not None:
@@ -211,10 +220,10 @@ def check(path: Path, platform: str, wheels: list[Wheel]) -> None:
         raise BuildError(f"The manifest in {path.name} is not the project's with the platform and the wheels added.")
     if held != expected:
         wrong = sorted(held.items() ^ expected.items())[0][0]
-        raise BuildError(f"{path.name} does not hold what was pinned: {wrong} is missing, added or changed.")
-    if any(wheel.parts[0] == "numpy" for wheel in wheels):
+        raise BuildError(f"{path.name} does not hold the pinned wheels: {wrong} is missing, added or changed.")
+    if any(wheel.name.startswith("numpy-") for wheel in wheels):
         raise BuildError("Blender brings its own numpy, which a wheel would replace; take numpy out of the pins.")
-    for start in ("__init__.py", "LICENSE", f"licences/{NOTICES.name}", *(_licence_folder(w.file) for w in wheels)):
+    for start in ("__init__.py", "LICENSE", f"licences/{NOTICES.name}", *(_licence_folder(w.name) for w in wheels)):
         if not any(name == start or name.startswith(f"{start}/") for name in names):
             raise BuildError(f"{path.name} lacks {start}.")
 

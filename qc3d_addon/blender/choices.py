@@ -74,7 +74,10 @@ def _choice(setting: str, description: str) -> Any:  # noqa: ANN401 - what it is
 
 
 class InnerKey(bpy.types.PropertyGroup):
-    """A key between the first and the last, by its name."""
+    """A key between the first and the last, by its name.
+
+    It has nothing else: a script that passes a list of them to an operator must give every property of each.
+    """
 
 
 class MapChoices:
@@ -128,6 +131,7 @@ class BakeChoices(MapChoices):
 
     if TYPE_CHECKING:
         count: int
+        more: bool
         use_tolerance: bool
         tolerance: float
         weights: WeightKind
@@ -146,6 +150,13 @@ class BakeChoices(MapChoices):
             min=1,
             max=MAX_STEPS - 1,
             soft_max=20,
+            options={'SKIP_SAVE'},
+        )
+        more: BoolProperty(
+            name="More Where Needed",
+            description="Make more in-betweens than that, up to twice as many, where volumes would not be kept "
+            "between them",
+            default=True,
             options={'SKIP_SAVE'},
         )
         use_tolerance: BoolProperty(
@@ -198,4 +209,29 @@ class BakeChoices(MapChoices):
         )
         frame_end: IntProperty(
             name="End", description="Frame that shows the last key", default=25, options={'SKIP_SAVE'}
+        )
+
+
+class TimedChoices(BakeChoices):
+    """The keys, when each is shown, and the in-betweens to make between them.
+
+    Numbers in a text, since properties have no lists of any length. They are hidden, since only scripts need them: the
+    panel has a row for each key.
+    """
+
+    if TYPE_CHECKING:
+        via_at: str
+        via_frames: str
+    else:
+        via_at: StringProperty(
+            name="Values",
+            description="Values of the slider or of the last key that show the keys to go through, such as "
+            "\"0.25 0.6\"; empty for even ones",
+            options={'SKIP_SAVE', 'HIDDEN'},
+        )
+        via_frames: StringProperty(
+            name="Frames",
+            description="Frames that show the keys to go through, such as \"12 18\"; what plays the in-betweens gets "
+            "keyframes there, at Start and at End",
+            options={'SKIP_SAVE', 'HIDDEN'},
         )

@@ -86,18 +86,24 @@ def find_fcurve(owner: Animated, data_path: str) -> bpy.types.FCurve | None:
 
 
 def is_animated(owner: Animated, data_path: str) -> bool:
-    """Whether a property of ``owner`` has keyframes in its active action or in an unmuted NLA strip."""
+    """Whether a property of ``owner`` has keyframes that play, in its active action or in an unmuted NLA strip."""
     if owner.animation_data is None:
         return False
     curve = find_fcurve(owner, data_path)
-    if curve is not None and len(curve.keyframe_points):
+    if curve is not None and plays(curve):
         return True
     for track in owner.animation_data.nla_tracks:
         for strip in track.strips if not track.mute else ():
             curves = _strip_fcurves(strip)
-            if not strip.mute and curves is not None and curves.find(data_path) is not None:
+            curve = None if strip.mute or curves is None else curves.find(data_path)
+            if curve is not None and plays(curve):
                 return True
     return False
+
+
+def plays(curve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve has keyframes and is not muted."""
+    return len(curve.keyframe_points) > 0 and not curve.mute
 
 
 def _strip_fcurves(strip: bpy.types.NlaStrip) -> Curves | None:

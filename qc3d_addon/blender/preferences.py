@@ -48,6 +48,7 @@ class QC3DPreferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "time_limit", text="Time Limit (Minutes)")
         layout.prop(self, "memory_limit", text="Memory Limit (MB)")
+        layout.operator("qc3d.copy_report", icon='COPYDOWN')
 
 
 def limits(context: bpy.types.Context) -> "Limits":

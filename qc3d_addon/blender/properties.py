@@ -9,7 +9,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..solver.errors import InputError
 from ..solver.settings import FitOptions, FrameOptions
@@ -62,6 +62,24 @@ def _set_row(settings: "ObjectSettings", row: int) -> None:
         settings.chosen = chains[row].slider
 
 
+class TimedKey(bpy.types.PropertyGroup):
+    """A key between the first and the last in the panel, with the value and the frame that show it."""
+
+    if TYPE_CHECKING:
+        at: float
+        frame: int
+    else:
+        at: FloatProperty(
+            name="Value",
+            description="Value of the slider, or of the key that plays the in-betweens, that shows this key",
+            default=0.5,
+            min=0.001,
+            max=0.999,
+            precision=3,
+        )
+        frame: IntProperty(name="Frame", description="Frame that shows this key", default=1)
+
+
 class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """The panel's choices, kept with the object.
 
@@ -70,12 +88,27 @@ class ObjectSettings(BakeChoices, bpy.types.PropertyGroup):
     """
 
     if TYPE_CHECKING:
+        via: "bpy.types.bpy_prop_collection_idprop[TimedKey]"  # type: ignore[assignment]
+        via_timing: str
         measure: str
         first: str
         last: str
         chosen: str
         row: int
     else:
+        via: CollectionProperty(
+            name="Through", description="The shape keys to go through on the way, in their order", type=TimedKey
+        )
+        via_timing: EnumProperty(
+            name="Spacing",
+            description="When the keys to go through are shown",
+            items=[
+                ("even", "Even", "The motion takes the same time from each key to the next"),
+                ("value", "Values", "Each key is shown at a value of the slider or of the last key"),
+                ("frame", "Frames", "Each key is shown at a frame; what plays the in-betweens gets keyframes there"),
+            ],
+            default="even",
+        )
         measure: EnumProperty(
             name="Measure", description="What the heat map shows", items=MEASURE_ITEMS, update=_show_measure
         )
@@ -113,13 +146,21 @@ def settings_of(obj: bpy.types.Object) -> ObjectSettings:
 def fill_from_panel(properties: bpy.types.OperatorProperties, settings: ObjectSettings) -> None:
     """Give every property that the caller of an operator left out the value that the panel shows.
 
-    The keys go together: who names the first or the last means those between as they are given, none included.
+    The keys go together: who names the first or the last means those between as they are given, none included. Who
+    gives a number of in-betweens means exactly that number.
     """
+    known = set(properties.bl_rna.properties.keys())
     if not any(properties.is_property_set(name) for name in ("from_key", "to_key", "via")):
+        timing = {"value": "via_at", "frame": "via_frames"}.get(settings.via_timing, "")
         for inner in settings.via:
             properties.via.add().name = inner.name
+        if timing in known and not properties.is_property_set(timing):
+            numbers = [f"{inner.at:.6g}" if timing == "via_at" else f"{inner.frame}" for inner in settings.via]
+            setattr(properties, timing, " ".join(numbers))
+    if "more" in known and properties.is_property_set("count") and not properties.is_property_set("more"):
+        properties.more = False
     left_out = [name for name in ("from_key", "to_key") if not properties.is_property_set(name)]
-    shared = set(properties.bl_rna.properties.keys()) & set(settings.bl_rna.properties.keys())
+    shared = known & set(settings.bl_rna.properties.keys())
     for name in shared - {"rna_type", "via"}:
         if not properties.is_property_set(name):
             setattr(properties, name, getattr(settings, name))
@@ -175,14 +216,25 @@ def fit_options(choices: MapChoices) -> FitOptions:
 
 def bake_request(choices: BakeChoices, keys: tuple[str, ...] | None = None) -> BakeRequest:
     """The choices as a request, for their own keys or others; raises InputError where they do not fit together."""
+    frames = [round(frame) for frame in _numbers(getattr(choices, "via_frames", ""))]
+    keyframes = (choices.frame_start, *frames, choices.frame_end) if choices.use_keyframes or frames else None
     return BakeRequest(
         keys=key_names(choices) if keys is None else keys,
         count=choices.count,
         fit_options=fit_options(choices),
-        frame_options=FrameOptions(choices.mode, choices.easing),
-        keyframes=(choices.frame_start, choices.frame_end) if choices.use_keyframes else None,
+        frame_options=FrameOptions(choices.mode, choices.easing, _numbers(getattr(choices, "via_at", ""))),
+        keyframes=keyframes,
         tolerance=choices.tolerance if choices.use_tolerance else 0.0,
         weights=choices.weights,
         play_on=choices.play_on,
         colliders=choices.colliders,
+        more=choices.more,
     )
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    """The numbers of a text, separated by spaces or commas; raises InputError for anything else."""
+    try:
+        return tuple(float(part) for part in text.replace(",", " ").split())
+    except ValueError as error:
+        raise InputError(f"{text!r} is not a row of numbers; write them like 12 18.") from error

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 
 from ..worker import engines
-from . import choices, cli, compat, live_scrub, preferences, properties
+from . import choices, cli, compat, live_scrub, preferences, properties, translations
 from .bake import jobs
 from .heat_map import legend
 from .keys import straight
@@ -20,6 +20,7 @@ from .operators.bake_inbetweens import (
     QC3D_OT_rebake,
 )
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
+from .operators.bug_report import QC3D_OT_copy_report
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -33,9 +34,15 @@ from .operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, Q
 from .operators.exports import QC3D_OT_export_in_betweens, QC3D_OT_read_usd
 from .operators.forget_record import QC3D_OT_forget_record
 from .operators.heat_map import QC3D_OT_heat_map, QC3D_OT_select_worst
-from .operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
+from .operators.inner_keys import (
+    QC3D_OT_add_inner_key,
+    QC3D_OT_go_through_sculpted,
+    QC3D_OT_keys_from_timeline,
+    QC3D_OT_remove_inner_key,
+)
 from .operators.live_scrub import QC3D_OT_live_scrub
 from .operators.map_files import QC3D_OT_load_map, QC3D_OT_save_map
+from .operators.open_demo import QC3D_OT_open_demo
 from .operators.prepare import QC3D_OT_prepare
 from .operators.split_key import QC3D_OT_split_key
 from .operators.straight import QC3D_OT_straight
@@ -43,6 +50,7 @@ from .ui import bake_list, menus, panel_combinations, panel_exports, panel_resul
 
 CLASSES = (
     choices.InnerKey,  # before the settings that contain it
+    properties.TimedKey,
     properties.ObjectSettings,
     QC3D_OT_prepare,
     preferences.QC3DPreferences,
@@ -72,8 +80,11 @@ CLASSES = (
     QC3D_OT_save_map,
     QC3D_OT_load_map,
     QC3D_OT_forget_record,
+    QC3D_OT_open_demo,
+    QC3D_OT_copy_report,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
+    QC3D_OT_keys_from_timeline,
     QC3D_OT_remove_inner_key,
     presets.QC3D_PT_presets,
     presets.QC3D_OT_add_preset,
@@ -89,6 +100,7 @@ _commands: list[object] = []
 
 def register() -> None:
     """Register the classes, the object's settings and the command ``blender --command qc3d``."""
+    translations.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     pointer: Callable[..., object] = bpy.props.PointerProperty  # some stubs say that it returns nothing
@@ -114,3 +126,4 @@ def unregister() -> None:
     delattr(bpy.types.Object, properties.SETTINGS)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    translations.unregister()

@@ -67,7 +67,12 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     command.add_argument("--all-keys", action="store_true", help="like --on-key for all shape keys that need it")
     amount = command.add_mutually_exclusive_group()
-    amount.add_argument("--frames", type=frame_count, metavar="N", help="number of in-betweens between every two keys")
+    amount.add_argument(
+        "--frames",
+        type=frame_count,
+        metavar="N",
+        help="number of in-betweens between every two keys (default: 5, or more where volumes would not be kept)",
+    )
     amount.add_argument(
         "--tolerance", type=float, metavar="T", help="as few in-betweens as keep the motion within this distance"
     )
@@ -75,9 +80,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     command.add_argument(
         "--keyframes",
         type=whole_number,
-        nargs=2,
-        metavar=("FIRST", "LAST"),
-        help="animate the key or slider that plays the in-betweens over these frames",
+        nargs="+",
+        metavar="FRAME",
+        help="animate the key or slider that plays the in-betweens: the first and the last frame, or one for each key",
     )
     command.add_argument(
         "--play-on",
@@ -155,12 +160,12 @@ def _request(arguments: argparse.Namespace, is_pair: bool) -> BakeRequest:
         raise InputError("Keys that play in-betweens themselves take neither --keyframes nor --play-on slider.")
     if arguments.tolerance is not None and not arguments.tolerance > 0.0:
         raise InputError(f"The tolerance is {arguments.tolerance}; it must be a distance above 0.")
-    count = {} if arguments.frames is None else {"count": arguments.frames}
+    count = {"more": True} if arguments.frames is None else {"count": arguments.frames}
     return BakeRequest(
         key_names(arguments) if is_pair else _NO_KEYS,
         fit_options=fit_options(arguments),
         frame_options=frame_options(arguments),
-        keyframes=arguments.keyframes,
+        keyframes=tuple(arguments.keyframes) if arguments.keyframes else None,
         tolerance=arguments.tolerance or 0.0,
         colliders=arguments.colliders,
         weights=arguments.weights,

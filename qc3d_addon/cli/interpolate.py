@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import get_args
 
 from ..solver.files.atomic import replacing_all, require_writable
-from ..solver.frames.bake import evenly_spaced
 from ..solver.frames.files import write_frames
+from ..solver.frames.key_times import KeyTimes
 from ..solver.frames.modes import needs_fits
 from ..solver.frames.remade import Settings
 from ..solver.frames.task import Task, carry_out
@@ -55,8 +55,8 @@ def _run(arguments: argparse.Namespace) -> None:
     files = output_files(arguments)
     require_writable(*files, inputs=[arguments.pair])
     names = key_names(arguments)
-    times = evenly_spaced((arguments.frames + 1) * (len(names) - 1) - 1)
     fit, frame = fit_options(arguments), frame_options(arguments)
+    times = KeyTimes.of(frame, len(names) - 1).between(arguments.frames)
     pairs = read_pairs(
         arguments.pair,
         names,

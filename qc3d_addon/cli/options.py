@@ -59,7 +59,7 @@ def fit_options(arguments: argparse.Namespace) -> FitOptions:
 
 def frame_options(arguments: argparse.Namespace) -> FrameOptions:
     """The options of the frames that were chosen."""
-    return FrameOptions(**_chosen(arguments, FrameOptions))
+    return FrameOptions(**{**_chosen(arguments, FrameOptions), "via_at": tuple(arguments.via_at)})
 
 
 def _chosen(arguments: argparse.Namespace, kind: type[FitOptions | FrameOptions]) -> dict[str, Any]:
@@ -82,6 +82,14 @@ def add_way(command: argparse.ArgumentParser, kind: str, is_required: bool = Tru
     )
     command.add_argument(
         "--via", action="append", default=[], metavar="NAME", help=f"a {kind} to go through; repeat for more, in order"
+    )
+    command.add_argument(
+        "--via-at",
+        type=float,
+        nargs="+",
+        default=(),
+        metavar="T",
+        help="when the motion is there, one number for each --via, from 0 (--from) to 1 (--to) (default: evenly)",
     )
     command.add_argument("--to", dest="last", required=is_required, metavar="NAME", help=f"the {kind} to end with")
 

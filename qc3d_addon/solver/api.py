@@ -110,7 +110,8 @@ class Fit:
         InputError
             If a time is outside 0..1 or an option is unknown.
         """
-        return finish(self._frames(steps.times_of(frames), FrameOptions(mode, easing), colliders), progress)
+        options = FrameOptions(mode, easing)
+        return finish(self._frames(steps.times_of(frames, 1, options), options, colliders), progress)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the fit to a file that ``load_fit`` and Blender's *Load Map* read; raises InputError if it cannot."""
@@ -220,6 +221,7 @@ def bake(
     mirror: Mirror = "auto",
     mode: Mode = "natural",
     easing: Easing = "linear",
+    via_at: Sequence[float] = (),
     colliders: Sequence[Collider] = (),
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
@@ -237,6 +239,8 @@ def bake(
         1 at the last.
     mode, easing
         See ``FrameOptions``.
+    via_at : sequence of float
+        Times of the keys between the first and the last; by default, all pairs of keys take the same time.
     colliders : sequence of Collider
         Surfaces that the frames must not enter.
     progress : callable
@@ -266,6 +270,7 @@ def bake(
         mirror=mirror,
         mode=mode,
         easing=easing,
+        via_at=via_at,
         colliders=colliders,
         **options,
     )
@@ -308,6 +313,15 @@ def combine(
     QC3DError
         If the keys, weights, order or options cannot be used, if the volume of a key with a weight between 0 and 1
         cannot be filled, or if memory would not be enough.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> turned, longer = corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], corners * [2.0, 1.0, 1.0]
+    >>> qc3d.combine(corners, [turned, longer], faces).shape[1].round(6) + 0.0  # the sum has (1, 1, 0)
+    array([0., 2., 0.])
     """
     return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
 
@@ -333,6 +347,15 @@ def judge_pairs(
     ------
     InputError
         If the keys cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> turned, longer = corners @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], corners * [2.0, 1.0, 1.0]
+    >>> [verdict.adding_is_right for verdict in qc3d.judge_pairs(corners, [turned, longer], faces)]
+    [False]
     """
     return verdicts(KeysOnBase(base, keys, faces, edges), pairs)
 
@@ -343,6 +366,7 @@ def bake_together(
     *,
     mode: Mode = "natural",
     easing: Easing = "linear",
+    via_at: Sequence[float] = (),
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> list[Bake]:
@@ -352,7 +376,7 @@ def bake_together(
     ----------
     meshes : sequence of (keys, faces)
         Of each mesh its keys, (n, 3) each and equally many for all, in coordinates that all share, and its triangles.
-    frames, mode, easing, progress, **options
+    frames, mode, easing, via_at, progress, **options
         See ``bake``.
 
     Returns
@@ -374,4 +398,4 @@ def bake_together(
     >>> [bake.frames.shape for bake in bakes]
     [(3, 4, 3), (3, 4, 3)]
     """
-    return steps.bake_together(meshes, frames, mode=mode, easing=easing, **options).run(progress)
+    return steps.bake_together(meshes, frames, mode=mode, easing=easing, via_at=via_at, **options).run(progress)

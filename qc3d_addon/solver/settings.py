@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from numbers import Integral, Real
 from typing import Any, Literal, TypedDict, get_args
 
@@ -23,6 +24,8 @@ WeightKind = Literal["smooth", "hats"]
 DENSE_STEPS = 48
 
 _MOST_TURNS = 100
+# Of the motion from one key to the next: in-betweens of shorter ones would be too close to tell apart.
+_LEAST_DURATION = 0.001
 
 
 @dataclass(frozen=True)
@@ -131,23 +134,36 @@ class FrameOptions:
         ``straight`` moves every vertex along a straight line and needs no fit.
     easing
         How the speed of the motion changes: ``linear``, ``ease-in``, ``ease-out`` or ``ease-in-out``.
+    via_at
+        Times of the keys between the first and the last, increasing, between 0 and 1; empty if every pair of keys takes
+        the same time before the easing.
 
     Raises
     ------
     InputError
-        If a value is none of these.
+        If a value is of the wrong type or out of its range.
 
     Examples
     --------
     >>> FrameOptions(easing="ease-in")
-    FrameOptions(mode='natural', easing='ease-in')
+    FrameOptions(mode='natural', easing='ease-in', via_at=())
     """
 
     mode: Mode = "natural"
     easing: Easing = "linear"
+    via_at: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         _require_choices(self, {"mode": Mode, "easing": Easing})
+        for time in self.via_at:
+            if not isinstance(time, Real) or isinstance(time, bool) or not 0.0 < time < 1.0:
+                raise InputError(f"The time of a key is {time!r}; it must be a number between 0 and 1.")
+        for time, following in pairwise((0.0, *self.via_at, 1.0)):
+            if following - time < _LEAST_DURATION:
+                raise InputError(
+                    f"Keys at {time:g} and {following:g} are too close or in the wrong order; each must come at least "
+                    f"{_LEAST_DURATION:g} after the one before."
+                )
 
 
 @dataclass(frozen=True)
@@ -158,6 +174,9 @@ class PlayOptions:
     ----------
     count : int
         Number of in-betweens between every two keys, evenly spaced in the control's position.
+    more : bool
+        Whether there may be more, up to 2 ``count`` + 1, between keys where volumes would otherwise be off by 0.1 % or
+        more beyond the motion itself.
     tolerance : float
         If positive, as few in-betweens as play every moment within this distance, in the keys' unit, placed where they
         help most; ``count`` is then ignored.
@@ -176,9 +195,12 @@ class PlayOptions:
     tolerance: float = 0.0
     weights: WeightKind = "smooth"
     also_at: tuple[float, ...] = ()
+    more: bool = False
 
     def __post_init__(self) -> None:
         _require_choices(self, {"weights": WeightKind})
+        if not isinstance(self.more, bool):
+            raise InputError(f"The option more is {self.more!r}; it must be True or False.")
         if not isinstance(self.count, Integral) or isinstance(self.count, bool) or self.count < 0:
             raise InputError(f"The number of in-betweens is {self.count!r}; it must be a whole number from 0.")
         numbers = [(self.tolerance, "tolerance"), *((place, "place of an in-between") for place in self.also_at)]

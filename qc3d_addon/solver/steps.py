@@ -27,7 +27,8 @@ from .errors import InputError
 from .fit import fit_pair as fitting
 from .fit.fitted_map import FittedMap
 from .frames import task as tasks
-from .frames.bake import Bake, evenly_spaced
+from .frames.bake import Bake
+from .frames.key_times import KeyTimes
 from .frames.task import Outcome, Task
 from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
@@ -99,6 +100,7 @@ def bake(
     mirror: Mirror = "auto",
     mode: Mode = "natural",
     easing: Easing = "linear",
+    via_at: Sequence[float] = (),
     colliders: Sequence[Collider] = (),
     **options: Unpack[FitChoices],
 ) -> Work[Bake]:
@@ -106,14 +108,15 @@ def bake(
     if len(keys) < 2:
         raise InputError(f"There are {len(keys)} keys; in-betweens need two or more.")
     shapes, through = _named(keys)
+    frame_options = FrameOptions(mode, easing, tuple(via_at))
     task = Task.of_keys(
         shapes,
         faces,
         edges,
         through,
         FitOptions(**options),
-        FrameOptions(mode, easing),
-        times_of(frames, len(keys) - 1),
+        frame_options,
+        times_of(frames, len(keys) - 1, frame_options),
         Collider.joined([part.at_keys(len(keys)) for part in colliders]) if colliders else None,
         polygons,
         mirror,
@@ -142,6 +145,7 @@ def bake_together(
     *,
     mode: Mode = "natural",
     easing: Easing = "linear",
+    via_at: Sequence[float] = (),
     **options: Unpack[FitChoices],
 ) -> Work[list[Bake]]:
     """The frames of several meshes in one map, step by step; see :func:`.api.bake_together` for the parameters."""
@@ -153,8 +157,8 @@ def bake_together(
         PlacedMesh(consecutive_pairs(dict(zip(through, keys, strict=True)), faces, None, through), np.eye(4))
         for keys, faces in meshes
     ]
-    together, frame_options = Together(placed), FrameOptions(mode, easing)
-    times = times_of(frames, len(through) - 1)
+    together, frame_options = Together(placed), FrameOptions(mode, easing, tuple(via_at))
+    times = times_of(frames, len(through) - 1, frame_options)
     task = Task(together.pairs, through, FitOptions(**options), frame_options, times)
     task.require_memory(machine_limit_mb())
     return Work(_apart(tasks.carry_out(task), together, frame_options, through))
@@ -167,10 +171,11 @@ def _apart(
     return together.apart(bake, options, through)
 
 
-def times_of(frames: int | ArrayLike, pairs: int = 1) -> Floats:
+def times_of(frames: int | ArrayLike, pairs: int, options: FrameOptions) -> Floats:
     """(k,) times of the keys and of the given number of in-betweens between every two; or the given times."""
+    key_times = KeyTimes.of(options, pairs)
     if isinstance(frames, (int, np.integer)) and not isinstance(frames, bool):
-        return evenly_spaced((int(frames) + 1) * pairs - 1)
+        return key_times.between(int(frames))
     return np.atleast_1d(np.asarray(frames, dtype=np.float64))
 
 

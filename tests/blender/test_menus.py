@@ -37,3 +37,14 @@ def test_entries(menu: str) -> None:
     if menu == "VIEW3D_MT_object_animation":  # search looks at the texts
         for word in ("in-between", "breakdown", "tween"):
             assert all(word in text.lower() for _, text in Menu.layout.entries)
+
+
+def test_the_help_menu_has_the_demo_and_the_report() -> None:
+    class Menu:
+        layout = Layout()
+
+    for draw in bpy.types.TOPBAR_MT_help.draw._draw_funcs:
+        if draw.__module__.startswith("qc3d_addon"):
+            draw(Menu, bpy.context)
+    assert [name for name, _ in Menu.layout.entries] == ["qc3d.open_demo", "qc3d.copy_report"]
+    assert Menu.layout.operator_context == 'INVOKE_DEFAULT'  # otherwise nothing asks about unsaved changes

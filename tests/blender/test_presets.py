@@ -41,7 +41,7 @@ def test_saved_and_taken_up_again(figure: bpy.types.Object, folder: Path) -> Non
 
 
 def test_every_choice_but_the_keys_and_frames_is_saved(figure: bpy.types.Object) -> None:
-    keys = {"from_key", "via", "to_key", "extra_turns"}
+    keys = {"from_key", "via", "via_timing", "to_key", "extra_turns"}
     keys |= {"first", "last"}
     other = keys | {"use_keyframes", "frame_start", "frame_end", "measure", "colliders", "chosen", "row"}
     known = set(figure.qc3d.bl_rna.properties.keys()) - {"rna_type", "name"}

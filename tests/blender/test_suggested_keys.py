@@ -81,26 +81,34 @@ def test_sculpted_keys_named_by_percentages_are_offered(figure: bpy.types.Object
     for name, part in zip(names, (0.75, 0.25, 0.5), strict=True):
         add_key(figure, name, half(part))
     add_key(figure, "Leaning_50", half(0.5))
-    assert sculpted_between(figure, "Lean") == [names[1], names[2], names[0]]
-    assert sculpted_between(figure, "Stretch") == []
+    assert sculpted_between(figure, "Lean") == {names[1]: 0.25, names[2]: 0.5, names[0]: 0.75}
+    assert sculpted_between(figure, "Stretch") == {}
     make_active(figure, "Lean")
     assert bpy.ops.qc3d.go_through_sculpted() == {"FINISHED"}
     assert [inner.name for inner in figure.qc3d.via] == [names[1], names[2], names[0]]
     assert (figure.qc3d.from_key, figure.qc3d.to_key) == ("Basis", "Lean")
+    assert figure.qc3d.via_timing == "even"
 
 
-def test_those_that_do_not_stand_evenly_are_not_offered(figure: bpy.types.Object) -> None:
-    add_key(figure, "Lean_30", half(0.3))
-    assert sculpted_between(figure, "Lean") == []
+def test_uneven_ones_are_offered_at_the_values_in_their_names(figure: bpy.types.Object) -> None:
     make_active(figure, "Lean")
-    with pytest.raises(RuntimeError, match="No keys are named as evenly spaced in-betweens of 'Lean'"):
+    add_key(figure, "Lean_2", half(0.3))  # a second version, not an in-between at 2 %
+    with pytest.raises(RuntimeError, match="No keys are named as in-betweens of 'Lean'"):
         bpy.ops.qc3d.go_through_sculpted()
+    add_key(figure, "Lean_30", half(0.3))
+    add_key(figure, "Lean.30", half(0.3))  # there can be one key at a place
+    assert sculpted_between(figure, "Lean") == {"Lean_30": 0.3}
     add_key(figure, "Lean_66", half(0.66))
-    figure.data.shape_keys.key_blocks["Lean_30"].name = "Lean_33"
-    assert sculpted_between(figure, "Lean") == ["Lean_33", "Lean_66"]
+    assert bpy.ops.qc3d.go_through_sculpted() == {"FINISHED"}
+    assert [(row.name, round(row.at, 6)) for row in figure.qc3d.via] == [("Lean_30", 0.3), ("Lean_66", 0.66)]
+    assert figure.qc3d.via_timing == "value"
+    for name, other in (("Lean_30", "Lean_33"), ("Lean.30", "Other")):
+        figure.data.shape_keys.key_blocks[name].name = other
+    assert bpy.ops.qc3d.go_through_sculpted() == {"FINISHED"}
+    assert figure.qc3d.via_timing == "even"  # exactly at thirds
 
 
 def test_made_keys_are_not_offered(figure: bpy.types.Object) -> None:
     assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", mode="linear", count=1) == {"FINISHED"}
     assert "Lean_50" in figure.data.shape_keys.key_blocks
-    assert sculpted_between(figure, "Lean") == []
+    assert sculpted_between(figure, "Lean") == {}

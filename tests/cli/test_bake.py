@@ -53,6 +53,33 @@ def test_a_chain_goes_there_and_back(bar_scene: Path, tmp_path: Path, monkeypatc
     assert set(report["keys"]) < set(bpy.data.objects["Bar"].data.shape_keys.key_blocks.keys())
 
 
+@pytest.mark.parametrize(
+    ("times", "via_at", "frames"),
+    [
+        (["--keyframes", "10", "15", "30"], 0.25, [(10, 0.0), (15, 0.25), (30, 1.0)]),
+        (["--via-at", "0.6"], 0.6, []),
+        (["--via-at", "0.6", "--keyframes", "10", "15", "30"], 0.6, [(10, 0.0), (15, 0.6), (30, 1.0)]),
+    ],
+)
+def test_keys_on_the_way_at_values_and_frames(
+    bar_scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    times: list[str],
+    via_at: float,
+    frames: list[tuple[int, float]],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    way = ["--via", "Bent", "--to", "Basis", "--report", "out.json", "--mode", "linear"]
+    assert bake(bar_scene, *way, *times) == 0
+    report = json.loads(Path("out.json").read_text())
+    assert report["places"][3] == pytest.approx(via_at)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    for frame, value in frames:
+        bpy.context.scene.frame_set(frame)
+        assert bpy.data.objects["Bar"][report["slider"]] == pytest.approx(value, abs=1e-6)
+
+
 def test_a_file_may_be_baked_into_itself(bar_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     copy = tmp_path / "out.blend"
@@ -75,6 +102,8 @@ def test_a_file_may_be_baked_into_itself(bar_scene: Path, tmp_path: Path, monkey
         (["--frames", "5000"], "5000 in-betweens are not possible"),
         (["--frames", "-1"], "-1 in-betweens are not possible"),
         (["--keyframes", "9", "9"], "must come after the first"),
+        (["--keyframes", "9", "10", "11"], "3 frames are given for 2 keys"),
+        (["--via-at", "0.5"], "1 times are given for 0 keys"),
         (["--output", "missing/out.blend"], "out.blend cannot be written: No such file or directory"),
         (["--report", "out.blend"], "named twice"),
     ],

@@ -56,6 +56,58 @@ def test_congruent_pieces_are_rigid_and_cross_no_more_than_the_straight_blend(sh
         assert counts.excess(frame) <= straight
 
 
+def test_a_piece_that_is_turned_inside_out_goes_straight_and_the_others_stay_rigid() -> None:
+    key0, key1, triangles = scattered(BOX, BOX_FACES, 6)
+    inside_out = slice(2 * len(BOX), 3 * len(BOX))
+    middle = key1[inside_out].mean(axis=0)
+    key1[inside_out] = middle + (key1[inside_out] - middle) * [0.4, 0.3, -0.3]
+    key1[: len(BOX)] = key0[: len(BOX)]  # still: so the whole has no motion of its own
+    bake = qc3d.bake([key0, key1], triangles, 3)
+    straight = key0 + bake.times[:, None, None] * (key1 - key0)
+    assert np.abs((bake.frames - straight)[:, inside_out]).max() < 1e-5
+    others = [piece for piece in range(6) if piece != 2]
+    for frame in bake.frames[1:-1]:
+        pieces = zip(key0.reshape(6, -1, 3)[others], frame.reshape(6, -1, 3)[others], strict=True)
+        assert max(rigid_misfit(*piece) for piece in pieces) < 1e-9
+    assert any("turned inside out" in note for note in bake.report.notes)
+
+
+def wing(angle: float, side: float) -> tuple[Floats, Ints]:
+    """A plate of length 1 whose angle against the horizon grows by half along its span, in degrees."""
+    flat, faces = box_surface((8, 3, 1), (1.0, 0.5, 0.02))
+    along = np.linspace(0.0, 1.0, 401)
+    slopes = np.radians(angle) * (1.0 + 0.5 * along)
+    arc = np.cumsum(np.stack([np.cos(slopes), np.sin(slopes)])[:, :-1] / 400.0, axis=1)
+    arc = np.concatenate([np.zeros((2, 1)), arc], axis=1)
+    span = flat[:, 0] + 0.5
+    x, z = (np.interp(span, along, coordinate) for coordinate in arc)
+    slope, height = np.radians(angle) * (1.0 + 0.5 * span), flat[:, 2] - 0.01
+    points = np.column_stack([side * (0.12 + x - height * np.sin(slope)), flat[:, 1], z + height * np.cos(slope)])
+    return points, faces if side > 0.0 else faces[:, ::-1]
+
+
+def test_a_bird_of_three_loose_parts() -> None:
+    """The body stays calm, and the wings, which bend, keep their lengths and stay beside it."""
+    body, faces = box_surface((2, 6, 2), (0.2, 0.9, 0.2))
+    keys, triangles = [], [faces]
+    for angle, lift in ((-60.0, 0.0), (60.0, 0.02)):
+        wings = [wing(angle, side) for side in (1.0, -1.0)]
+        keys.append(np.concatenate([body - [0.0, 0.0, 0.1], *(points for points, _ in wings)]) + [0.0, 0.0, lift])
+    count = len(wings[0][0])
+    triangles += [wings[0][1] + len(body), wings[1][1] + len(body) + count]
+    every = np.concatenate(triangles)
+    bake = qc3d.bake(keys, every, 3)
+    assert bake.report.crossings == [0] * 5
+    straight = keys[0] + bake.times[:, None, None] * (keys[1] - keys[0])
+    assert np.abs((bake.frames - straight)[:, : len(body)]).max() < 2e-3
+    roots = np.flatnonzero(np.abs(keys[0][:, 0]) < 0.14)
+    assert np.abs((bake.frames - straight)[:, roots]).max() < 0.02
+    spans = bake.frames[:, every] - np.roll(bake.frames[:, every], 1, axis=2)
+    lengths = np.linalg.norm(spans, axis=3).reshape(5, -1)
+    low, high = np.minimum(lengths[0], lengths[-1]), np.maximum(lengths[0], lengths[-1])
+    assert np.percentile(np.maximum(low / lengths, lengths / high) - 1.0, 99) < 2e-3
+
+
 class TestRigidParts:
     def parts(self, change: float = 0.0) -> tuple[RigidParts, Floats, Floats]:
         key0, key1, _ = scattered(BOX, BOX_FACES, 3)

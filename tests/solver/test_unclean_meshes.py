@@ -427,6 +427,7 @@ def test_soups(seed: int) -> None:
         (np.full_like(BAR, -np.inf), BENT, "Vertex 0 of the first key has a coordinate that is not finite"),
         (1e200 * BAR, 1e200 * BENT, "first key has coordinates up to 5e\\+200; scale the mesh"),
         (BAR, 1e307 * BENT, "second key has coordinates up to"),
+        (1.7e308 * np.sign(BAR - BAR.mean(axis=0)), BAR, "first key has coordinates up to 2e.308, whose differences"),
         (1e-200 * BAR, 1e-200 * BENT, "first key is only 5e-200 in size; scale the mesh"),
         (1e-20 * BAR, 1e20 * BENT, "1e\\+40 times as large"),
         (BAR, 1e-12 * BENT, "1e-12 times as large"),

@@ -94,7 +94,9 @@ def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> P
         chain = Record.read(keys).chain_on_key(name)
         base = keys.key_blocks[name].relative_key.name
         through = chain.through if chain is not None and chain.through[0] == base else (base, name)
-        request = replace(choices, keys=through, play_on="key", keyframes=None)
+        via_at = chain.via_at if chain is not None and chain.through == through else ()
+        frame_options = replace(choices.frame_options, via_at=via_at)
+        request = replace(choices, keys=through, frame_options=frame_options, play_on="key", keyframes=None)
         if chain is not None and chain.through == through and chain.request == request.remembered():
             is_whole = chain_keys.owned_keys(keys, chain).keys() == chain.keys.keys()
             if is_whole and chain.digests == tuple(digest(keys.key_blocks[other]) for other in through):

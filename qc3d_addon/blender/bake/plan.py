@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ...solver.errors import InputError
-from ..keys import chain_keys, chain_shapes, shape_keys
+from ..keys import chain_keys, chain_shapes, own_keyframes, shape_keys
 from ..keys.double_motion import double_motion, unknown_inbetweens
 from ..keys.sculpted import Sculpted
 from ..kinds import keys_of
@@ -122,17 +122,18 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     keys = keys_of(obj)
     record = Record.read(keys)
     checks.require_keys(keys, request.keys)
+    request = request.timed
     if request.play_on == "auto":
-        on_key = checks.control_problem(keys, request.keys, request.keys[0]) is None
-        request = replace(request, play_on="key" if on_key else "slider")
+        request = replace(request, play_on="key" if _can_play(keys, request) else "slider")
     checks.require_control(keys, request.keys, request.base)
     pairs = mesh_data.read_pairs(obj, request.keys, request.base)
     chain = _chain(obj, record, request)
     shape_keys.require_writable(obj, chain, request.keyframes)
     play = request.play_options
     play = replace(play, also_at=(*play.also_at, *Sculpted.of(obj, chain).places))
-    if play.tolerance > 0.0 and chain.request.get("tolerance") == play.tolerance:
-        # With the same tolerance, a re-bake keeps all steps, so that their keys can stay.
+    same = {"tolerance": play.tolerance, "more": play.more, "count": play.count}
+    if (play.tolerance > 0.0 or play.more) and same.items() <= chain.request.items():
+        # With the same aim, a re-bake keeps all steps, so that their keys can stay.
         play = replace(play, also_at=(*play.also_at, *chain.places[1:-1]))
     usable, notes = {}, []
     for ends, pair in pairs.items():
@@ -192,13 +193,14 @@ def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
     InputError
         If the object or the keys can no longer be used.
     """
-    from ...solver.frames.bake import evenly_spaced
+    from ...solver.frames.key_times import KeyTimes
 
     request = request_again(obj, chain)
     chain_keys.control_of(checks.require_object(obj), chain).require()
     plan = plan_bake(obj, request)
-    times = evenly_spaced(PREVIEW_STEPS * (len(request.keys) - 1) - 1)
-    even = replace(request.frame_options, easing="linear")
+    key_times = KeyTimes.of(request.frame_options, len(request.keys) - 1).before_easing
+    even = replace(request.frame_options, easing="linear", via_at=tuple(key_times.at[1:-1].tolist()))
+    times = key_times.between(PREVIEW_STEPS - 1)
     return replace(plan, task=replace(plan.task, frame_options=even, times=times, play=None))
 
 
@@ -245,10 +247,14 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
     # Looked for while the chain still has the steps of its earlier bake.
     unknown = [*unknown_inbetweens(keys, chain, record.chains)] if chain.on_key else []
 
-    with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes) as (undo, said):
+    with shape_keys.chain_written(obj, chain, shapes, steps, request.keyframes, request.frame_options.via_at) as (
+        undo,
+        said,
+    ):
         control = chain_keys.control_of(obj, chain)
         owner = obj.name if control.is_key else control.owner.name
         notes = [*plan.notes, *bake.report.notes, *said, *kept]
+        notes += own_keyframes.mute(keys, chain, undo) if request.keyframes is not None else []
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
         notes += double_motion(obj, chain, record.chains)
         notes += unknown
@@ -295,6 +301,17 @@ def _keep_maps(keys: bpy.types.Key, record: Record, plan: Plan, outcome: Outcome
         record.keep_map(keys, kept_map(ends, plan.task.pairs[ends], plan.request.fit_options), data, undo)
 
 
+def _can_play(keys: bpy.types.Key, request: BakeRequest) -> bool:
+    """Whether the value of the last key can play the request.
+
+    Keyframes at inner keys need a control of their own where that value has a driver or keyframes.
+    """
+    has_inner = request.keyframes is not None and len(request.keyframes) > 2
+    if has_inner and own_keyframes.is_controlled(keys, request.keys[-1]):
+        return False
+    return checks.control_problem(keys, request.keys, request.keys[0]) is None
+
+
 def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain:
     """The entry of these keys in the record; a new one is added if there is none."""
     on_key = request.keys[-1] if request.play_on == "key" else ""
@@ -312,8 +329,8 @@ def _chain(obj: bpy.types.Object, record: Record, request: BakeRequest) -> Chain
 
 def _steps_of_keys(places: tuple[float, ...], request: BakeRequest) -> dict[int, str]:
     """Names of the request's keys, by the step that shows them."""
-    from ...solver.frames.easing import uneased
+    from ...solver.frames.key_times import KeyTimes
 
-    at_keys = uneased(np.linspace(0.0, 1.0, len(request.keys)), request.frame_options.easing)
+    at_keys = KeyTimes.of(request.frame_options, len(request.keys) - 1).at
     steps = np.abs(np.array(places)[:, None] - at_keys).argmin(axis=0)
     return dict(zip(steps.tolist(), request.keys, strict=True))

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from typing import Any, Literal, get_args
 
 from ...solver.errors import InputError
@@ -32,7 +33,8 @@ class BakeRequest:
     fit_options, frame_options
         The solver's options.
     keyframes
-        First and last frame between which the slider goes from 0 to 1, or None to leave it without keyframes.
+        Frames that show the keys: the first and the last, or one for each key; None to leave what plays the in-betweens
+        without keyframes. Frames of inner keys decide where these are on the control, unless the frame options do.
     tolerance
         If positive, the bake makes as few in-betweens as keep every vertex within this distance, in the object's own
         units, and ignores ``count``.
@@ -42,21 +44,25 @@ class BakeRequest:
         How in-betweens are blended: ``smooth``, or ``hats`` for straight lines from each to the next.
     play_on
         What plays them: ``key``, the value of the last key, which must be relative to the first; ``slider``, a new
-        custom property; or ``auto``, the key if possible.
+        custom property; or ``auto``, the key if possible. A key with keyframes of its own plays no keys at frames of
+        theirs.
     also_at
         Places of more in-betweens, each between 0 and 1 on the control.
+    more
+        Whether there may be more in-betweens than ``count`` between keys where volumes would otherwise not be kept.
     """
 
     keys: tuple[str, ...]
     count: int = 5
     fit_options: FitOptions = field(default_factory=FitOptions)
     frame_options: FrameOptions = field(default_factory=FrameOptions)
-    keyframes: tuple[int, int] | None = None
+    keyframes: tuple[int, ...] | None = None
     tolerance: float = 0.0
     colliders: str = ""
     weights: WeightKind = "smooth"
     also_at: tuple[float, ...] = ()
     play_on: PlayOn = "auto"
+    more: bool = False
 
     def __post_init__(self) -> None:
         if len(self.keys) < 2:
@@ -68,9 +74,8 @@ class BakeRequest:
             raise InputError(f"{self.count} in-betweens are not possible; 1 to {most} are.")
         if not 0.0 <= self.tolerance < float("inf"):
             raise InputError(f"The tolerance is {self.tolerance}; it must be a distance, or 0 for a fixed number.")
-        if self.keyframes is not None and self.keyframes[0] >= self.keyframes[1]:
-            first, last = self.keyframes
-            raise InputError(f"Keyframes from {first} to {last} are not possible; the last must come after the first.")
+        if self.keyframes is not None:
+            _require_frames(self.keyframes, len(self.keys))
         if self.play_on not in get_args(PlayOn):
             raise InputError(f"Unknown control {self.play_on!r}; choose one of {', '.join(get_args(PlayOn))}.")
         _ = self.play_options  # refused here where it is not possible
@@ -78,14 +83,32 @@ class BakeRequest:
     @property
     def play_options(self) -> PlayOptions:
         """How a control is to play the motion."""
-        return PlayOptions(self.count, self.tolerance, self.weights, self.also_at)
+        return PlayOptions(self.count, self.tolerance, self.weights, self.also_at, self.more)
+
+    @property
+    def timed(self) -> BakeRequest:
+        """The same request, with the inner keys on the control where their frames are between the first and the last.
+
+        Raises
+        ------
+        InputError
+            If their times are too close.
+        """
+        if self.keyframes is None or len(self.keyframes) == 2 or self.frame_options.via_at:
+            return self
+        first, *inner, last = self.keyframes
+        via_at = tuple((frame - first) / (last - first) for frame in inner)
+        return replace(self, frame_options=replace(self.frame_options, via_at=via_at))
 
     def remembered(self) -> dict[str, Any]:
         """What a later bake of the same keys needs to know, as plain values."""
+        settings = asdict(self.fit_options) | asdict(self.frame_options)
         return {
             "count": self.count,
+            "more": self.more,
             "tolerance": self.tolerance,
-            "settings": asdict(self.fit_options) | asdict(self.frame_options),
+            "via_at": list(settings.pop("via_at")),
+            "settings": settings,
             "colliders": self.colliders,
             "weights": self.weights,
             "also_at": list(self.also_at),
@@ -108,7 +131,8 @@ class BakeRequest:
         """
         try:
             options = dict(stored.plain_dict(remembered["settings"]))
-            frame_options = FrameOptions(**{field.name: options.pop(field.name) for field in fields(FrameOptions)})
+            via_at = tuple(stored.number(time) for time in stored.plain_list(remembered.get("via_at", [])))
+            frame_options = FrameOptions(options.pop("mode"), options.pop("easing"), via_at)
             return cls(
                 keys,
                 stored.whole(remembered["count"], 1, names.MAX_STEPS),
@@ -119,6 +143,7 @@ class BakeRequest:
                 weights=remembered.get("weights", "hats"),  # all that earlier versions knew
                 also_at=tuple(stored.number(place) for place in stored.plain_list(remembered.get("also_at", []))),
                 play_on=remembered.get("play_on", "slider"),
+                more=remembered.get("more", False),
             )
         except (KeyError, TypeError, ValueError, InputError) as error:
             raise InputError("The options of the earlier bake are unknown; bake anew.") from error
@@ -156,3 +181,16 @@ class BakeResult:
             f"{self.report['count']} in-betweens in {seconds:.1f} s (engine {self.report['engine']}); "
             f"{plays} on '{self.slider_object}' plays them."
         )
+
+
+def _require_frames(frames: tuple[int, ...], keys: int) -> None:
+    """Raise InputError unless there are two frames or one for each key, in increasing order."""
+    if len(frames) not in (2, keys):
+        raise InputError(
+            f"{len(frames)} frames are given for {keys} keys; give the first and the last, or one for each key."
+        )
+    for frame, following in pairwise(frames):
+        if frame >= following:
+            raise InputError(
+                f"Keyframes from {frame} to {following} are not possible; the last must come after the first."
+            )

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import bpy
 
@@ -14,7 +15,8 @@ from ..store import combined_keys
 from ..store.records import Chain, Record
 
 # Riggers and other programs name sculpted in-betweens by the key's name and a percentage, perhaps with a separator.
-_PERCENTAGE = re.compile(r"[_. ]?(\d{1,2})")
+# One digit is rather the number of a version.
+_PERCENTAGE = re.compile(r"[_. ]?(\d{2})")
 _ROUNDING = 0.01  # tolerance for places in whole percents, rounded or truncated
 
 
@@ -37,40 +39,48 @@ def suggested_keys(obj: bpy.types.Object, first: str, last: str) -> tuple[str, s
     return first, last
 
 
-def sculpted_between(obj: bpy.types.Object, last: str) -> list[str]:
-    """The user's own keys that are named like in-betweens of a key, such as "Smile_25", "Smile_50" and "Smile_75".
+def sculpted_between(obj: bpy.types.Object, last: str) -> dict[str, float]:
+    """The user's own keys that are named like in-betweens of a key, such as "Smile_25" and "Smile_60".
 
-    They are sorted by place, and returned only if the places are evenly spaced, like those of keys to go through.
+    Returns
+    -------
+    dict
+        The places, between 0 and 1, that the names say, by name and in their order; of several names for one place,
+        the first.
     """
     keys = shape_keys_of(obj) if obj.type == 'MESH' else None
     if keys is None or not last:
-        return []
-    made = _made_keys(keys)
-    places = {}
+        return {}
+    made = made_keys(keys)
+    places: dict[float, str] = {}
     for key in keys.key_blocks:
         if key.name.startswith(last) and key.name not in made:
             found = _PERCENTAGE.fullmatch(key.name[len(last) :])
             if found is not None and int(found[1]) > 0:
-                places[int(found[1]) / 100.0] = key.name
+                places.setdefault(int(found[1]) / 100.0, key.name)
+    return {places[place]: place for place in sorted(places)}
+
+
+def are_even(places: Sequence[float]) -> bool:
+    """Whether places between 0 and 1 are evenly spaced, as far as whole percents can tell."""
     evenly = [number / (len(places) + 1) for number in range(1, len(places) + 1)]
-    is_even = all(abs(place - even) <= _ROUNDING for place, even in zip(sorted(places), evenly, strict=True))
-    return [places[place] for place in sorted(places)] if is_even else []
+    return all(abs(place - even) <= _ROUNDING for place, even in zip(places, evenly, strict=True))
 
 
 def _active_key(obj: bpy.types.Object, keys: bpy.types.Key) -> str:
     """The active key, or the one that it is an in-between of; with two keys only, the second."""
     key = obj.active_shape_key
     if key is None or key == keys.reference_key:
-        own = [other.name for other in keys.key_blocks if other.name not in _made_keys(keys)]
+        own = [other.name for other in keys.key_blocks if other.name not in made_keys(keys)]
         return own[1] if len(own) == 2 else ""
-    made = _made_keys(keys)
+    made = made_keys(keys)
     chain = made.get(key.name)
     if chain is not None:
         return chain.through[-1] if chain.through[-1] in keys.key_blocks else ""
     return "" if key.name in made else key.name
 
 
-def _made_keys(keys: bpy.types.Key) -> dict[str, Chain | None]:
+def made_keys(keys: bpy.types.Key) -> dict[str, Chain | None]:
     """Names of the generated keys, with the chain of those that are in-betweens."""
     try:
         made: dict[str, Chain | None] = dict.fromkeys(combined_keys.names_made(keys))

@@ -52,7 +52,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
                 if drivers.reads(driven.driver, control):
                     present(driven.driver).variables[0].targets[0].id = copy
         curve = compat.ensure_fcurve(played.owner, control.path, undo)
-        slider.set_keyframes(curve, (1, frames))
+        slider.set_keyframes(curve, [(1.0, 0.0), (float(frames), 1.0)])
         _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:

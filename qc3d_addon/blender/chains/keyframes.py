@@ -76,6 +76,8 @@ def bake_to_keyframes(
     _put_in_place(animated, np.array(frames, dtype=np.float64))
     remove.hide_heat_map(obj, chain)
     notes += remove.remove_slider(control, chain)
+    if chain.muted:
+        notes.append("Keyframes that the bake muted stay muted, since the keyframes of the in-betweens replace them.")
     keys.update_tag()
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     return notes

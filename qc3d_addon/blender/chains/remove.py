@@ -11,7 +11,7 @@ import bpy
 from .. import compat
 from ..bake import bookkeeping
 from ..heat_map import heat_map
-from ..keys import chain_keys, drivers, shape_keys
+from ..keys import chain_keys, drivers, own_keyframes, shape_keys
 from ..keys.control import Control
 from ..kinds import keys_of
 from ..store.records import Chain, Record
@@ -34,6 +34,7 @@ def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[st
     hide_heat_map(obj, chain)
     notes = shape_keys.remove_keys(obj, list(chain_keys.owned_keys(keys_of(obj), chain).values()))
     notes += remove_slider(control, chain)
+    notes += own_keyframes.unmute(keys_of(obj), chain)
     with ExitStack() as undo:  # last, so that a chain whose removal was interrupted can be removed again
         bookkeeping.forget(keys_of(obj), record, chain, undo)
         undo.pop_all()

@@ -52,7 +52,8 @@ def play_on_key(obj: bpy.types.Object, record: Record, chain: Chain) -> tuple[Ch
     label = names.chain_label((name,), {*obj.keys(), *(other.slider for other in record.chains)})
     measures = kept_measures.read(keys, chain.slider, len(mesh_of(obj).vertices))
     moved = replace(
-        chain, slider=label, keys={}, keyframes=None, request={**chain.request, "play_on": "key"}, on_key=name
+        chain, slider=label, keys={}, keyframes=None, request={**chain.request, "play_on": "key"}, on_key=name,
+        muted=(),
     )
     record.chains.append(moved)
     places = shape_keys.Steps(chain.places, chain.corners)

@@ -14,6 +14,7 @@ from ..store.records import Chain
 from . import drivers
 from .chain_keys import owned_keys
 from .control import value_path
+from .own_keyframes import own_keys
 
 
 def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) -> list[str]:
@@ -25,39 +26,30 @@ def double_motion(obj: bpy.types.Object, chain: Chain, chains: Sequence[Chain]) 
         All chains of the object.
     """
     keys = keys_of(obj)
-    if chain.on_key:
-        return []
-    found = [_on_by_itself(key) for key in _own_keys(keys, chain)]
+    what = f"'{chain.on_key}'" if chain.on_key else "the slider"
+    found = [_on_by_itself(key, what) for key in own_keys(keys, chain)]
     return [sentence for sentence in found if sentence] + list(_shown_twice(keys, chain, chains))
 
 
-def _own_keys(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.ShapeKey]:
-    """The user's keys that a slider goes through, except the Basis."""
-    for name in dict.fromkeys(chain.through):
-        key = keys.key_blocks.get(name)
-        if key is not None and key != keys.reference_key:
-            yield key
-
-
-def _on_by_itself(key: bpy.types.ShapeKey) -> str:
-    """A sentence about what moves a key besides the slider; empty if nothing does."""
+def _on_by_itself(key: bpy.types.ShapeKey, what: str) -> str:
+    """A sentence about what moves a key besides the control, named ``what``; empty if nothing does."""
     keys, path = expect(bpy.types.Key, key.id_data), value_path(key.name)
     animation = keys.animation_data
     if key.mute:
         return ""
     if animation is not None and animation.drivers.find(path) is not None:
-        return f"Key '{key.name}' is driven, which adds to what the slider shows."
+        return f"Key '{key.name}' is driven, which adds to what {what} shows."
     if compat.is_animated(keys, path):
-        return f"Key '{key.name}' is animated, which adds to what the slider shows."
+        return f"Key '{key.name}' is animated, which adds to what {what} shows."
     if key.value != 0.0:
-        return f"Key '{key.name}' has the value {key.value:.2f}, which adds to what the slider shows; set it to 0."
+        return f"Key '{key.name}' has the value {key.value:.2f}, which adds to what {what} shows; set it to 0."
     return ""
 
 
 def _shown_twice(keys: bpy.types.Key, chain: Chain, chains: Sequence[Chain]) -> Iterator[str]:
     """Other sliders that show the first key together with this one, each at its start."""
     first = chain.through[0]
-    for other in chains if first != keys.reference_key.name else ():
+    for other in chains if first != keys.reference_key.name and not chain.on_key else ():
         is_slider = other.slider != chain.slider and not other.on_key and not other.mirror_of
         if is_slider and other.through[0] == first and other.through != chain.through:
             yield f"The slider '{other.slider}' starts at '{first}' too, which then shows twice; keep one of them."

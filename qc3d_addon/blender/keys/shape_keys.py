@@ -17,7 +17,7 @@ from .. import compat
 from ..kinds import keys_of
 from ..store import names
 from ..store.mesh_data import key_coordinates, set_key_coordinates
-from ..store.records import LEAST_DISTANCE, Chain
+from ..store.records import LEAST_DISTANCE, Chain, keyframe_values
 from . import drivers, slider
 from .chain_keys import base_key, control_of, owned_keys
 from .control import Control, key_path
@@ -33,7 +33,7 @@ class Steps(NamedTuple):
     corners: tuple[int, ...]
 
 
-def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, int] | None) -> None:
+def require_writable(obj: bpy.types.Object, chain: Chain, keyframes: tuple[int, ...] | None) -> None:
     """Check everything that writing the chain may change.
 
     Raises
@@ -86,7 +86,8 @@ def chain_written(
     chain: Chain,
     shapes: dict[int, NDArray[np.float32]],
     steps: Steps,
-    keyframes: tuple[int, int] | None,
+    keyframes: tuple[int, ...] | None,
+    via_at: tuple[float, ...] = (),
 ) -> Iterator[tuple[ExitStack, list[str]]]:
     """Write the shapes of a chain into shape keys that one control plays; undo everything if that or the block fails.
 
@@ -104,7 +105,9 @@ def chain_written(
     steps
         Where the steps are.
     keyframes
-        First and last frame of the slider's keyframes, or None for none.
+        Frames of the control's keyframes, at the first and the last key or at each; None for none.
+    via_at
+        Places of the inner keys; needed for keyframes at each.
 
     Yields
     ------
@@ -126,6 +129,7 @@ def chain_written(
     stale = [key for key in owned.values() if key not in kept.values()]
     active = obj.active_shape_key
     curve: bpy.types.FCurve | None = None
+    wanted: slider.Keyframes = ()
     notes: list[str] = []
     with ExitStack() as undo:
         undo.callback(_activate, obj, active)
@@ -148,15 +152,16 @@ def chain_written(
             set_key_coordinates(written[step], shapes[step])
             drivers.drive_value(written[step], control, weights, step)
         if keyframes is not None:
-            curve, notes = slider.begin_keyframes(control, chain, keyframes, undo)
+            wanted = keyframe_values(keyframes, via_at)
+            curve, notes = slider.begin_keyframes(control, chain, wanted, undo)
         chain.keys = {step: written[step].name for step in sorted(written)}
         chain.keyframes = chain.keyframes if curve is None else keyframes
         yield undo, notes
         undo.pop_all()
     # Nothing below can fail for a reason that was not checked before anything was written.
     _let_play(kept, control, weights)
-    if curve is not None and keyframes is not None:
-        slider.set_keyframes(curve, keyframes)
+    if curve is not None:
+        slider.set_keyframes(curve, wanted)
     remove_keys(obj, stale)
 
 

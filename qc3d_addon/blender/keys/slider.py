@@ -9,16 +9,20 @@ slider therefore shows it from the moment of the bake on. Other keys with values
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .. import compat
 from ..store import id_properties
 from ..store.records import Chain
 from .control import Control, slider_path
+
+Keyframes = Sequence[tuple[float, float]]  # frames and values
+_ROUNDING = 1e-6  # frames and values are in single precision
 
 
 def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitStack) -> None:
@@ -41,12 +45,17 @@ def ensure_property(obj: bpy.types.Object, name: str, start: float, undo: ExitSt
 
 
 def begin_keyframes(
-    control: Control, chain: Chain, wanted: tuple[int, int], undo: ExitStack
+    control: Control, chain: Chain, wanted: Keyframes, undo: ExitStack
 ) -> tuple[bpy.types.FCurve | None, list[str]]:
-    """The curve that gets keyframes at two frames, or None if it stays as it is, and sentences that say why.
+    """The curve that gets the keyframes, or None if it stays as it is, and sentences that say why.
 
     The user's own keyframes are never replaced, and neither are those of an earlier bake at the same frames, whose
     timing may have been edited since. Closing ``undo`` undoes what was made.
+
+    Parameters
+    ----------
+    chain
+        The chain, with the keyframes of its previous bake.
     """
     owner, path = control.owner, control.path
     what = f"key '{control.name}'" if control.is_key else f"slider '{control.name}'"
@@ -56,18 +65,19 @@ def begin_keyframes(
     if existing is not None and len(existing.keyframe_points):
         if chain.keyframes is None:
             return None, [f"The {what} is already animated; its keyframes were left as they are."]
-        if chain.keyframes == wanted:
+        made = chain.keyframe_values
+        if made == list(wanted):
             return None, []
-        made = [*zip(chain.keyframes, (0.0, 1.0), strict=True)]
-        if [(point.co.x, point.co.y) for point in existing.keyframe_points] != made:
+        found = np.array([point.co for point in existing.keyframe_points])
+        if found.shape != np.shape(made) or not np.allclose(found, made, rtol=_ROUNDING, atol=_ROUNDING):
             return None, [f"The keyframes of the {what} were edited and were left as they are."]
     return compat.ensure_fcurve(owner, path, undo), []
 
 
-def set_keyframes(curve: bpy.types.FCurve, frames: tuple[int, int]) -> None:
-    """Replace the keyframes of a curve by linear ones from 0 at the first frame to 1 at the second."""
+def set_keyframes(curve: bpy.types.FCurve, wanted: Keyframes) -> None:
+    """Replace the keyframes of a curve by linear ones."""
     while len(curve.keyframe_points):
         curve.keyframe_points.remove(curve.keyframe_points[0], fast=True)
-    for frame, value in zip(frames, (0.0, 1.0), strict=True):
+    for frame, value in wanted:
         curve.keyframe_points.insert(frame, value, options={'FAST'}).interpolation = 'LINEAR'
     curve.update()

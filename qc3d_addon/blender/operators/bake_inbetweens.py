@@ -12,7 +12,7 @@ from bpy.props import BoolProperty
 
 from ..bake.plan import Plan, plan_bake, plan_one_more, request_again, write_bake
 from ..bake.together import objects_with_keys, plan_together, write_together
-from ..choices import BakeChoices
+from ..choices import TimedChoices
 from ..kinds import present
 from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
 
-class QC3D_OT_bake_inbetweens(BakeChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_bake_inbetweens(TimedChoices, ChildWork, bpy.types.Operator):
     """Fill in the frames between two or more shape keys: new shape keys, all played by one slider or key"""
 
     bl_idname = "qc3d.bake_inbetweens"
@@ -83,7 +83,7 @@ class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
         return _written(plan, outcome)
 
 
-class QC3D_OT_bake_objects(BakeChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_bake_objects(TimedChoices, ChildWork, bpy.types.Operator):
     """Bake the selected objects that have these shape keys together, so that lashes stay on lids and clothes on skin"""
 
     bl_idname = "qc3d.bake_objects"

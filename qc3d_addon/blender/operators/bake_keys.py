@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty
 from ...solver.errors import QC3DError
 from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
 from ..bake.plan import Plan
-from ..choices import BakeChoices
+from ..choices import BakeChoices, InnerKey
 from ..kinds import keys_of, present
 from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
@@ -41,7 +41,8 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
     if TYPE_CHECKING:
         which: str
         # Shadows bpy_struct.keys, the names of custom properties, of which an operator has none.
-        keys: "bpy.types.bpy_prop_collection_idprop[KeyChoice]"  # type: ignore[assignment]
+        keys: "bpy.types.bpy_prop_collection_idprop[InnerKey]"  # type: ignore[assignment]
+        ticks: "bpy.types.bpy_prop_collection_idprop[KeyChoice]"
     else:
         which: EnumProperty(
             name="Keys",
@@ -49,13 +50,16 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
             items=[
                 ("all", "All", "All keys except the Basis and baked in-betweens"),
                 ("selected", "Selected", "Keys selected in the list; before Blender 5, keys that you tick in a dialog"),
-                ("named", "Named", "Keys that are ticked in the operator's own list"),
+                ("named", "Named", "Keys of the list \"keys\""),
             ],
             default="all",
             options={'SKIP_SAVE'},
         )
         keys: CollectionProperty(
-            name="Keys", description="Keys to bake, as [{\"name\": key}, ...]", type=KeyChoice, options={'SKIP_SAVE'}
+            name="Keys", description="Keys to bake, as [{\"name\": key}, ...]", type=InnerKey, options={'SKIP_SAVE'}
+        )
+        ticks: CollectionProperty(
+            name="Ticks", description="Keys of the dialog", type=KeyChoice, options={'SKIP_SAVE', 'HIDDEN'}
         )
 
     @classmethod
@@ -66,15 +70,14 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
         self._asks = self.which == "selected" and not _can_select() and not bpy.app.background
         if not self._asks:
             return super().invoke(context, event)
-        self.keys.clear()
+        self.ticks.clear()
         for name in bakeable_keys(context.active_object):
-            self.keys.add().name = name
-        self.which = "named"
+            self.ticks.add().name = name
         return set(present(context.window_manager).invoke_props_dialog(self))
 
     def draw(self, context: bpy.types.Context) -> None:
         column = present(self.layout).column()
-        for key in self.keys:
+        for key in self.ticks:
             column.prop(key, "use", text=key.name)
 
     def execute(self, context: bpy.types.Context) -> Status:
@@ -119,7 +122,9 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
 
     def _chosen(self, obj: bpy.types.Object) -> list[str]:
         if self.which == "named" or (self.which == "selected" and len(self.keys)):
-            return [key.name for key in self.keys if key.use]
+            return [key.name for key in self.keys]
+        if getattr(self, "_asks", False):
+            return [key.name for key in self.ticks if key.use]
         known = bakeable_keys(obj)
         if self.which == "all":
             return known

@@ -15,7 +15,7 @@ from ..chains import absolute_copy, alembic, keyframes, mirror, remove, to_key
 from ..kinds import keys_of, present
 from ..store import checks
 from ..store.records import Chain, Record
-from .common import SLIDER, OperatorMixin, Status, chosen_chain, end_previews, poll_chains
+from .common import SLIDER, OperatorMixin, Status, chosen_chain, end_previews, poll_chains, report_error
 
 _MOST_FRAMES = 100_000
 
@@ -44,7 +44,7 @@ class ChainWork(OperatorMixin):
             chain = present(record.chain_of_slider(slider))
             *notes, done = self.work(context, obj, record, chain)
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         for note in notes:
             self.report({'WARNING'}, note)

@@ -15,7 +15,7 @@ from .. import compat, preferences
 from ..bake import jobs, progress_bar
 from ..bake.plan import Plan
 from ..kinds import present
-from .common import OperatorMixin, Status
+from .common import OperatorMixin, Status, report_error
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
@@ -90,10 +90,10 @@ class ChildWork(OperatorMixin):
                 manager.progress_end()
             return self._finish(self.write_all(plan, outcome))
         except KeyboardInterrupt:
-            self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
+            report_error(self, f"{self.bl_label} was interrupted; nothing was changed.")
             return {'CANCELLED'}
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
@@ -118,7 +118,7 @@ class ChildWork(OperatorMixin):
             return work()
         except QC3DError as error:
             jobs.end()
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         except BaseException:
             jobs.end()  # otherwise no other job could ever start
@@ -130,7 +130,7 @@ class ChildWork(OperatorMixin):
             return self._finish(self.write_all(None, None))
         problem = jobs.busy_problem()
         if problem is not None:
-            self.report({'ERROR'}, problem)
+            report_error(self, problem)
             return {'CANCELLED'}
         self._start(context, plan)
         present(context.window_manager).modal_handler_add(self)

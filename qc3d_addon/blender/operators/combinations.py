@@ -15,7 +15,7 @@ from .. import compat
 from ..combinations import combine, verdicts
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys
-from .common import OperatorMixin, Status, end_previews, poll_active_object
+from .common import OperatorMixin, Status, end_previews, poll_active_object, report_error
 
 
 class CombinationWork(OperatorMixin):
@@ -42,10 +42,10 @@ class CombinationWork(OperatorMixin):
                     else:
                         said = str(step)
         except KeyboardInterrupt:
-            self.report({'ERROR'}, f"{self.bl_label} was interrupted; nothing was changed.")
+            report_error(self, f"{self.bl_label} was interrupted; nothing was changed.")
             return {'CANCELLED'}
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         finally:
             manager.progress_end()

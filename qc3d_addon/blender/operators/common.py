@@ -33,6 +33,20 @@ else:
     OperatorMixin = object
 
 
+_errors: list[str] = []  # the last one that an operator reported since Blender was started
+
+
+def report_error(operator: bpy.types.Operator, sentence: str) -> None:
+    """Show an error, and remember it for bug reports."""
+    _errors[:] = [f"{operator.bl_idname}: {sentence}"]
+    operator.report({'ERROR'}, sentence)
+
+
+def last_error() -> str | None:
+    """The last error that was shown, after the operator's name."""
+    return _errors[-1] if _errors else None
+
+
 def end_previews() -> None:
     """Let the file show what was baked, before it is worked on: no moments between, and no straight blend."""
     live_scrub.end()

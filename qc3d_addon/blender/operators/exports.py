@@ -13,7 +13,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ...solver.errors import InputError, QC3DError
 from ..exports import export, read_usd
 from ..kinds import present
-from .common import Status, end_previews, poll_active_object, poll_chains
+from .common import Status, end_previews, poll_active_object, poll_chains, report_error
 
 _FORMATS = (
     ('.usdc', "USD", "Blend shapes with in-betweens: Maya, Unreal, Houdini"),
@@ -77,7 +77,7 @@ class QC3D_OT_export_in_betweens(bpy.types.Operator):
             path = path if path.suffix else path.with_suffix(self.format)
             notes = export.export(context.active_object, path, self.density)
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         for note in notes:
             self.report({'WARNING'}, note)
@@ -112,7 +112,7 @@ class QC3D_OT_read_usd(bpy.types.Operator):
         try:
             *notes, done = read_usd.read_in_betweens(context.active_object, _path(self.filepath))
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         for note in notes:
             self.report({'WARNING'}, note)

@@ -45,13 +45,14 @@ class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
         return plan_preview(obj, chain)
 
     def write(self, plan: Plan, outcome: "Outcome") -> list[str]:
+        from ...solver.frames.key_times import KeyTimes
         from ...solver.frames.preview import PreviewCurve
 
         straight.end()
         chain = chosen_chain(plan.find_object(), self.slider)
         assert outcome.bake is not None
-        pairs = len(plan.request.keys) - 1
-        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, pairs, plan.request.frame_options.easing))
+        key_times = KeyTimes.of(plan.request.frame_options, len(plan.request.keys) - 1)
+        live_scrub.begin(plan, chain, PreviewCurve(outcome.bake.frames, key_times))
         return [f"Drag the slider '{chain.slider}': it now shows the exact motion."]
 
     def _switched_off(self, context: bpy.types.Context) -> Status | None:

@@ -17,7 +17,7 @@ from ..properties import fill_panel, settings_of
 from ..store import checks
 from ..store.records import Chain, Record
 from .chains import ChainWork
-from .common import SLIDER, Status, poll_active_object, poll_chains
+from .common import SLIDER, Status, poll_active_object, poll_chains, report_error
 
 _ENDING = ".qc3dmap"
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class QC3D_OT_load_map(bpy.types.Operator):
             obj = checks.require_object(context.active_object)
             loaded = map_files.load_maps(obj, _path(self.filepath, "read"))
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         # A map can be used only with the options that it was made with, so the panel takes them over.
         fill_panel(settings_of(obj), loaded.through, loaded.options)

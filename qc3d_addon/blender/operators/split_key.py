@@ -12,7 +12,7 @@ from bpy.props import FloatProperty, StringProperty
 from ...solver.errors import QC3DError
 from ..keys.split import split_key
 from ..store import checks
-from .common import Status, poll_active_object
+from .common import Status, poll_active_object, report_error
 
 
 class QC3D_OT_split_key(bpy.types.Operator):
@@ -49,7 +49,7 @@ class QC3D_OT_split_key(bpy.types.Operator):
             name = self.key or (active.name if active is not None else "")
             made = split_key(obj, name, self.falloff)
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         self.report({'INFO'}, f"'{name}' was split into '{made[0]}' and '{made[1]}'.")
         return {'FINISHED'}

@@ -11,7 +11,7 @@ from .. import live_scrub
 from ..keys import straight
 from ..kinds import keys_of
 from ..store import checks
-from .common import SLIDER, Status, chosen_chain, poll_chains
+from .common import SLIDER, Status, chosen_chain, poll_chains, report_error
 
 
 class QC3D_OT_straight(bpy.types.Operator):
@@ -37,6 +37,6 @@ class QC3D_OT_straight(bpy.types.Operator):
             else:
                 straight.show(obj, chain)
         except QC3DError as error:
-            self.report({'ERROR'}, str(error))
+            report_error(self, str(error))
             return {'CANCELLED'}
         return {'FINISHED'}

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
@@ -63,7 +64,8 @@ class Chain:
     keys
         Names of the generated shape keys, by step.
     keyframes
-        First and last frame of the keyframes that a bake put on the slider, or None.
+        Frames of the keyframes that a bake put on the control, at the first and the last key or at each; None if it put
+        none.
     request
         The request of the newest bake, as plain values; empty for bakes of older versions. Only ``BakeRequest.again``
         reads it.
@@ -76,6 +78,8 @@ class Chain:
         Hashes of the shapes of the keys ``through`` at the newest bake; empty for bakes of older versions.
     mirror_of
         Slider of the chain that this one is the mirror image of; empty if it was baked from its own keys.
+    muted
+        Names of the keys ``through`` whose own keyframes a bake muted, because they would add to what a slider shows.
     """
 
     through: tuple[str, ...]
@@ -83,12 +87,13 @@ class Chain:
     places: tuple[float, ...] = (0.0, 1.0)
     corners: tuple[int, ...] = ()
     keys: dict[int, str] = field(default_factory=dict)
-    keyframes: tuple[int, int] | None = None
+    keyframes: tuple[int, ...] | None = None
     request: dict[str, Any] = field(default_factory=dict)
     result: Summary | None = None
     mirror_of: str = ""
     on_key: str = ""
     digests: tuple[str, ...] = ()
+    muted: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, values: object) -> Chain:
@@ -105,19 +110,22 @@ class Chain:
             raise ValueError("one key for two steps")
         keyframes = found.pop("keyframes", None)
         if keyframes is not None:
-            first, last = (stored.whole(frame, -_MOST_FRAME, _MOST_FRAME) for frame in stored.plain_list(keyframes))
-            if first >= last:
-                raise ValueError("keyframes without time between them")
-            keyframes = (first, last)
+            keyframes = tuple(
+                stored.whole(frame, -_MOST_FRAME, _MOST_FRAME) for frame in stored.plain_list(keyframes)
+            )
+            if len(keyframes) not in (2, len(through)) or any(last <= first for first, last in pairwise(keyframes)):
+                raise ValueError("keyframes that are not those of keys, or without time between them")
         request, result = _request(found.pop("request", {})), Summary.from_json(found.pop("result", None))
         slider, mirror_of = stored.name(found.pop("slider")), stored.text(found.pop("mirror_of", ""), LIMIT)
         on_key = stored.text(found.pop("on_key", ""), LIMIT)
         digests = tuple(stored.text(one, _LONGEST_DIGEST) for one in stored.plain_list(found.pop("digests", [])))
+        muted = tuple(stored.name(name, _LONGEST_KEY) for name in stored.plain_list(found.pop("muted", [])))
         if on_key not in ("", through[-1]):
             raise ValueError("played by a key that is not its last")
         if found:
             raise ValueError("values that are not known")
-        return cls(through, slider, places, corners, keys, keyframes, request, result, mirror_of, on_key, digests)
+        row = (through, slider, places, corners, keys, keyframes)
+        return cls(*row, request, result, mirror_of, on_key, digests, muted)
 
     @property
     def base(self) -> str:
@@ -133,6 +141,19 @@ class Chain:
     def easing(self) -> Easing:
         """The easing of the newest bake; linear if unknown."""
         return next((known for known in get_args(Easing) if known == self._setting("easing")), "linear")
+
+    @property
+    def keyframe_values(self) -> list[tuple[float, float]]:
+        """Frames and values of the keyframes that a bake put on the control."""
+        return keyframe_values(self.keyframes or (), self.via_at)
+
+    @property
+    def via_at(self) -> tuple[float, ...]:
+        """Places of the inner keys, where the newest bake was told them; otherwise empty: they are evenly spaced."""
+        values = self.request.get("via_at")
+        if not isinstance(values, list) or not all(isinstance(value, float) for value in values):
+            return ()
+        return tuple(values)
 
     def _setting(self, name: str) -> str:
         settings = self.request.get("settings")
@@ -150,6 +171,12 @@ class Chain:
         from ...solver.frames.weights import Weights  # scipy would make Blender start slower
 
         return Weights.smooth(self.places, self.corners)
+
+
+def keyframe_values(frames: Sequence[int], via_at: Sequence[float]) -> list[tuple[float, float]]:
+    """Frames and values of keyframes at the first and the last key, or at each of them with the places of the inner."""
+    inner = via_at if len(frames) > 2 else ()
+    return [(float(frame), value) for frame, value in zip(frames, (0.0, *inner, 1.0), strict=False)]
 
 
 @dataclass(frozen=True)
@@ -224,6 +251,7 @@ class Record:
             names = renamed(keys, chain.through, chain.digests, chain.on_key, chain.keys.values())
             chain.through = tuple(names.get(name, name) for name in chain.through)
             chain.on_key = names.get(chain.on_key, chain.on_key)
+            chain.muted = tuple(names.get(name, name) for name in chain.muted)
 
     def write(self, keys: bpy.types.Key, undo: ExitStack) -> None:
         """Store the record with ``keys``, without the maps of deleted keys; closing ``undo`` undoes that."""

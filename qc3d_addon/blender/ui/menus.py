@@ -9,6 +9,8 @@ import bpy
 from ..kinds import present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from ..operators.bake_keys import QC3D_OT_bake_keys
+from ..operators.bug_report import QC3D_OT_copy_report
+from ..operators.open_demo import QC3D_OT_open_demo
 from ..operators.split_key import QC3D_OT_split_key
 
 _OTHER_WORDS = "(Breakdown, Tween)"  # what animators look for; Blender's search knows only what an entry says
@@ -35,9 +37,19 @@ def _draw_animation(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout.operator(QC3D_OT_rebake.bl_idname, text=f"Re-Bake In-Betweens {_OTHER_WORDS}")
 
 
+def _draw_help(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    """In *Help*: the demo, and what a bug report needs."""
+    layout = present(menu.layout)
+    layout.separator()
+    layout.operator_context = 'INVOKE_DEFAULT'  # it asks before unsaved changes are lost
+    layout.operator(QC3D_OT_open_demo.bl_idname, icon='ARMATURE_DATA')
+    layout.operator(QC3D_OT_copy_report.bl_idname, text="Copy QC3D Report for a Bug", icon='COPYDOWN')
+
+
 _ENTRIES = (
     (bpy.types.MESH_MT_shape_key_context_menu, _draw_keys),
     (bpy.types.VIEW3D_MT_object_animation, _draw_animation),
+    (bpy.types.TOPBAR_MT_help, _draw_help),
 )
 
 

@@ -9,14 +9,20 @@ from typing import Literal
 import bpy
 
 from ...worker import engines
-from ..bake import jobs, progress_bar
+from ..bake import jobs, progress_bar, timeline
 from ..bake.suggested_keys import sculpted_between
 from ..kinds import keys_of, present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
 from ..operators.cancel import QC3D_OT_cancel
-from ..operators.inner_keys import QC3D_OT_add_inner_key, QC3D_OT_go_through_sculpted, QC3D_OT_remove_inner_key
+from ..operators.inner_keys import (
+    QC3D_OT_add_inner_key,
+    QC3D_OT_go_through_sculpted,
+    QC3D_OT_keys_from_timeline,
+    QC3D_OT_remove_inner_key,
+)
 from ..operators.map_files import QC3D_OT_load_map
+from ..operators.open_demo import QC3D_OT_open_demo
 from ..operators.prepare import QC3D_OT_prepare
 from ..properties import ObjectSettings, panel_keys, settings_of
 from ..store import checks, records
@@ -72,6 +78,10 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
                 together.operator(QC3D_OT_bake_objects.bl_idname, icon='OUTLINER_OB_GROUP_INSTANCE')
         if problem is not None:
             draw_sentence(context, layout, problem)
+            if checks.object_problem(obj) is not None:  # nothing to work on: something to try
+                demo = layout.column()
+                demo.operator_context = IN_THE_SIDEBAR
+                demo.operator(QC3D_OT_open_demo.bl_idname, icon='ARMATURE_DATA')
             return
         obj = present(obj)
         notice = engines.engine_notice() if settings_of(obj).engine != 'delaunay' else None
@@ -84,6 +94,8 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     _draw_keys(layout, obj, settings)
     amount = layout.column(align=True)
     amount.prop(settings, "tolerance" if settings.use_tolerance else "count")
+    if not settings.use_tolerance:
+        amount.prop(settings, "more")
     amount.prop(settings, "use_tolerance")
     look = layout.column()
     look.row().prop(settings, "play_on", expand=True)
@@ -91,8 +103,10 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     look.row().prop(settings, "quality", expand=True)
     look.prop_search(settings, "colliders", bpy.data, "collections")
     frames = layout.column(align=True)
-    frames.prop(settings, "use_keyframes")
-    if settings.use_keyframes:
+    at_frames = len(settings.via) > 0 and settings.via_timing == "frame"
+    if not at_frames:
+        frames.prop(settings, "use_keyframes")
+    if settings.use_keyframes or at_frames:
         frames.prop(settings, "frame_start")
         frames.prop(settings, "frame_end")
     header, advanced = layout.panel("QC3D_advanced", default_closed=True)
@@ -115,14 +129,22 @@ def _draw_keys(layout: bpy.types.UILayout, obj: bpy.types.Object, settings: Obje
     for index, inner in enumerate(settings.via):
         row = column.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
+        if settings.via_timing != "even":
+            value = row.row(align=True)
+            value.ui_units_x = 3.0
+            value.prop(inner, "at" if settings.via_timing == "value" else "frame", text="")
         row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
     column.prop_search(settings, "last", keys, "key_blocks", icon='SHAPEKEY_DATA')
-    sculpted = [] if settings.via else sculpted_between(obj, settings.last)
+    if settings.via:
+        column.row().prop(settings, "via_timing", expand=True)
+    sculpted = {} if settings.via else sculpted_between(obj, settings.last)
     if sculpted:
         column.operator(
             QC3D_OT_go_through_sculpted.bl_idname, text=f"Go Through {', '.join(sculpted)}", icon='SCULPTMODE_HLT'
         )
     column.operator(QC3D_OT_add_inner_key.bl_idname, icon='ADD')
+    if len(timeline.keyed(obj)) > 0:
+        column.operator(QC3D_OT_keys_from_timeline.bl_idname, icon='TIME')
 
 
 def _draw_job(layout: bpy.types.UILayout, job: jobs.Job) -> None:

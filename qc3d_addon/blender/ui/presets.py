@@ -14,6 +14,7 @@ from ..store import checks
 
 SETTINGS = (
     "count",
+    "more",
     "use_tolerance",
     "tolerance",
     "weights",

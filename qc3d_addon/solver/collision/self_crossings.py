@@ -84,17 +84,17 @@ class CrossingLimit:
         fresh = codes[~np.isin(codes, self._known)]
         return np.stack([fresh // len(self._faces), fresh % len(self._faces)], axis=1)
 
-    def faded(self, chosen: Bools) -> Floats:
-        """(n,) weights that are 1 at the chosen vertices and fall to 0 a few rings of neighbors away."""
+    def faded(self, chosen: Bools, rings: int = _FADING_RINGS) -> Floats:
+        """(n,) weights that are 1 at the chosen vertices and fall to 0 some rings of neighbors away."""
         edges = sides(self._faces)
         count = len(chosen)
         neighbours = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
         reached = chosen.astype(np.float64)
         total = reached.copy()
-        for _ in range(_FADING_RINGS):
+        for _ in range(rings):
             reached = np.minimum(reached + neighbours @ reached + neighbours.T @ reached, 1.0)
             total += reached
-        return np.asarray(total / (_FADING_RINGS + 1))
+        return np.asarray(total / (rings + 1))
 
     @staticmethod
     def left(excess: Sequence[int | None]) -> tuple[int, int]:

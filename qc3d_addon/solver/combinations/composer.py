@@ -25,6 +25,7 @@ from ..triangles.deformation import TriangleDeformation
 from ..triangles.geometry import vertex_areas
 from .averages import Averages
 from .base import KeysOnBase
+from .volumes import volume_off_range
 
 # Two keys that each squash by more than half must not turn anything inside out together. Where both shrink, the product
 # of their stretches is larger than the sum, so that only half of the product is a lower limit.
@@ -90,7 +91,7 @@ class Composer:
             by_component(_stretches(turned)[rows]),
             anchors,
             _lengths(self._base, scaled, system.springs[surface.springs]),
-            _added_ratios(self._closed.volumes(self._base), [self._closed.volumes(shape) for shape in scaled]),
+            self._volumes(anchors, scaled),
         )
         return keys.whole(Sweeps(surface, [wanted]).settled(SWEEPS)[0], shapes)
 
@@ -112,6 +113,12 @@ class Composer:
         system = self._system(self._usable(scaled))
         turned = [TriangleDeformation.between(self._base, shape, system.faces) for shape in scaled]
         return np.asarray(system.averages.rotations(_composed_rotations(turned))[self._keys.group])
+
+    def _volumes(self, about: Floats, scaled: Sequence[Floats]) -> Floats:
+        """(c,) wanted volumes: those of positions (n, 3) that are about right, within what the keys explain."""
+        volumes = self._closed.volumes(about)
+        alone = [self._closed.volumes(shape) for shape in scaled]
+        return volumes - volume_off_range(volumes, self._closed.volumes(self._base), alone)
 
     def _usable(self, scaled: Sequence[Floats]) -> Ints:
         """(u, 3) the usable triangles: those that have an area in all shapes."""
@@ -178,15 +185,10 @@ def _stretches(turned: Sequence[TriangleDeformation]) -> Floats:
 
 
 def _lengths(base: Floats, scaled: Sequence[Floats], edges: Ints) -> Floats:
-    """(e,) wanted lengths of the edges."""
+    """(e,) wanted lengths of edges: the base's plus each key's change, but at least half of the product of ratios."""
     lengths = [np.linalg.norm(shape[edges[:, 1]] - shape[edges[:, 0]], axis=1) for shape in (base, *scaled)]
-    return _added_ratios(lengths[0], lengths[1:])
-
-
-def _added_ratios(base: Floats, values: Sequence[Floats]) -> Floats:
-    """The base's volumes or lengths plus each key's relative changes, but at least half of the product of ratios."""
+    changes = [length - lengths[0] for length in lengths[1:]]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = [np.where(base != 0.0, value / base, 1.0) for value in values]
-    together = 1.0 + sum((ratio - 1.0 for ratio in ratios), start=np.zeros_like(base))
-    added = np.maximum(together, _LEAST_OF_PRODUCT * np.prod(ratios, axis=0)) * base
-    return np.asarray(np.where(base != 0.0, added, sum(values, start=np.zeros_like(base))))
+        product = lengths[0] * np.prod([length / lengths[0] for length in lengths[1:]], axis=0)
+    least = np.where(lengths[0] > 0.0, _LEAST_OF_PRODUCT * product, 0.0)
+    return np.asarray(np.maximum(lengths[0] + sum(changes, start=np.zeros_like(lengths[0])), least))

@@ -20,6 +20,7 @@ from ..triangles.topology import sides, unique_edges
 from .base import KeysOnBase
 from .joint_crossings import JointCrossings
 from .order import Bend, carries
+from .volumes import volume_off_range
 
 # Smallest visible differences, relative to the base's diagonal, to the lengths of edges, and to a volume.
 _SEEN_DISTANCE, _SEEN_LENGTHS, _SEEN_VOLUME = 0.003, 0.02, 0.005
@@ -45,8 +46,8 @@ class Verdict:
         How far edge lengths in the sum are from what the keys' own changes add up to, over the base's lengths; 99th
         percentile of the edges that both keys move.
     volume : float
-        How far the volume of a closed component is from what the keys' own changes add up to, over the base's volume;
-        the worst component.
+        How far the volume of a closed component is beyond what the keys' own changes explain, added or multiplied, over
+        the base's volume; the worst component.
     crossings : int or None
         Number of pairs of triangles that cross in the sum but in neither key; None if the search was given up.
     """
@@ -150,8 +151,9 @@ class _Judge:
         closed = np.abs(base) > _SMALLEST
         if not closed.any():
             return 0.0
-        wanted = self._volumes[1 + first] + self._volumes[1 + second] - base
-        return float((np.abs(self._closed.volumes(total) - wanted)[closed] / np.abs(base[closed])).max())
+        alone = [self._volumes[1 + first], self._volumes[1 + second]]
+        off = volume_off_range(self._closed.volumes(total), base, alone)
+        return float((np.abs(off)[closed] / np.abs(base[closed])).max())
 
     def _lengths_of(self, shape: Floats) -> Floats:
         return np.asarray(np.linalg.norm(shape[self._edges[:, 1]] - shape[self._edges[:, 0]], axis=1))

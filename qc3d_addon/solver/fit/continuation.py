@@ -14,6 +14,7 @@ from ..maps.representation import polar_decomposition
 from ..numerics.rotations import nearest_branch, rotation_vectors
 from ..support.threads import batches
 from ..surface.path import SurfacePath
+from ..tets.mesh import TetMesh
 from .fold_free import FoldFreeFitter
 
 STEP_DEGREES = 20.0  # rotation in one step; each step then takes only a few Newton iterations
@@ -38,6 +39,13 @@ class FollowedPath:
 
     maps: Floats
     turns: Floats
+
+    def ending_with(self, mesh: TetMesh, mapped: Floats) -> FollowedPath:
+        """The same way, with another, nearby map (N, 3) at its end."""
+        rotations = polar_decomposition(mesh.jacobians(mapped)).rotation
+        return FollowedPath(
+            np.concatenate([self.maps[:-1], mapped[None]]), nearest_branch(rotation_vectors(rotations), self.turns)
+        )
 
 
 def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:

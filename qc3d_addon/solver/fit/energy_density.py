@@ -30,21 +30,6 @@ def energy_density(squares: Floats, determinant: Floats) -> Floats:
     return np.asarray(shape + 0.5 * VOLUME_SHARE * (determinant + 1.0 / determinant))
 
 
-def regularized(determinant: Floats, width: float) -> tuple[Floats, Floats, Floats]:
-    """Regularized, positive determinants, close to the determinants that are large against ``width``; derivatives.
-
-    Garanzha et al. 2021, *Foldover-free maps in 50 lines of code*, equation 3: (D + √(D² + width²)) / 2.
-
-    Returns
-    -------
-    value, first, second : (M,)
-    """
-    root = np.sqrt(width**2 + determinant**2)
-    # In a form without cancellation for negative determinants.
-    value = 0.5 * np.where(determinant > 0.0, determinant + root, width**2 / (root + np.abs(determinant)))
-    return value, value / root, 0.5 * width**2 / root**3
-
-
 def derivatives(squares: Floats, determinant: Floats) -> Terms:
     """The density and its first and second derivatives with respect to |J|² and det J."""
     shape = (1.0 - VOLUME_SHARE) / 3.0 * determinant ** (-2.0 / 3.0)

@@ -14,12 +14,12 @@ from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair, require_sizes
 from ..keys.orientation import require_reachable
 from ..meshing.cube import fill_cube
-from ..meshing.vertex_mesh import COARSE_SHARE
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
 from ..tets.point_location import interpolation_matrix
+from ..triangles.topology import sides
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
@@ -29,6 +29,7 @@ from .meeting import MET, crossing_vertices, meet_keys
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
 _MOST_NAMED = 10  # vertices
+_LEAST_EDGE = 1e-6  # cube units: shorter edges have no stretch that can be told
 
 
 def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
@@ -121,17 +122,39 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            coarse = fill_cube(embedding.key0, faces, options, COARSE_SHARE)
-            yield Progress("mesh", 0.1)
-            fine = fill_cube(embedding.key0, faces, options)
+            filled = fill_cube(embedding.key0, faces, options, _stretches(embedding))
         yield Progress("mesh", 1.0)
+        yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        met = yield from staged("fit", meet_keys(embedding, coarse.mesh, fine.mesh, targets))
+        met = yield from staged("fit", meet_keys(embedding, filled.mesh, targets))
     yield Progress("fit", 1.0)
+    maps, turns = met.followed.maps, met.followed.turns
     return FittedMap(
-        embedding.pair, met.mesh, met.maps, met.turns, options, fine.engine, embedding, met.landmarks, (), seconds, path
+        embedding.pair,
+        filled.mesh,
+        maps,
+        turns,
+        options,
+        filled.engine,
+        embedding,
+        met.landmarks,
+        filled.notes,
+        seconds,
+        path,
     )
+
+
+def _stretches(embedding: Embedding) -> Floats:
+    """(n,) how many times longer the edges at each vertex are in the second key: the largest ratio."""
+    edges = sides(embedding.pair.faces)
+    before, after = (
+        np.linalg.norm(key[edges[:, 1]] - key[edges[:, 0]], axis=1) for key in (embedding.key0, embedding.key1)
+    )
+    ratios = after / np.maximum(before, _LEAST_EDGE)
+    stretches = np.zeros(len(embedding.key0))
+    np.maximum.at(stretches, edges.ravel(), np.repeat(ratios, 2))
+    return stretches
 
 
 def _missed_notes(fitted: FittedMap) -> list[str]:

@@ -46,6 +46,7 @@ class FoldFreeFitter:
         self.mesh = mesh
         self.landmarks = landmarks
         self._weights = weights
+        self._tet_weights = mesh.volumes
         self._free = ~mesh.on_cube_face
         self._pattern = StiffnessPattern(mesh.tets, len(mesh.points))
         # Landmarks lie inside tetrahedra, so their normal matrix has the sparsity pattern of the mesh.
@@ -102,21 +103,21 @@ class FoldFreeFitter:
         if determinant.min() <= 0.0:
             return np.inf
         density = energy_density(np.einsum("mij,mij->m", jacobians, jacobians), determinant)
-        return float(self.mesh.volumes @ density) + misfit.at(values)[0]
+        return float(self._tet_weights @ density) + misfit.at(values)[0]
 
     def _model(self, values: Floats, misfit: Misfit) -> tuple[float, Floats, Floats]:
         """Energy, gradient (N, 3) and projected element blocks (M, 4, 4, 3, 3) of the Gauss-Newton matrix."""
         jacobians = self.mesh.jacobians(values)
-        volumes = self.mesh.volumes
+        weights = self._tet_weights
         squares = np.einsum("mij,mij->m", jacobians, jacobians)
         cofactor = cofactors(jacobians)
         terms = derivatives(squares, determinants(jacobians))
         stress = terms.linear[:, None, None] * jacobians + terms.slope[:, None, None] * cofactor
         missed, misfit_gradient = misfit.at(values)
-        gradient = self.mesh.divergence(volumes[:, None, None] * stress) + misfit_gradient
+        gradient = self.mesh.divergence(weights[:, None, None] * stress) + misfit_gradient
         gradient[~self._free] = 0.0
-        blocks = projected_blocks(volumes, self.mesh.gradients, jacobians, cofactor, squares, terms)
-        return float(volumes @ terms.density) + missed, gradient, blocks
+        blocks = projected_blocks(weights, self.mesh.gradients, jacobians, cofactor, squares, terms)
+        return float(weights @ terms.density) + missed, gradient, blocks
 
     def _newton_step(self, gradient: Floats, element_blocks: Floats) -> Floats:
         matrix = self._pattern.assemble_blocks(element_blocks)

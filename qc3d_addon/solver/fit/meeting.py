@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The quality ``exact``: a fold-free map that meets both keys.
 
-A coarse map follows the motion from key to key (module ``continuation``). It is transferred to tetrahedra as fine as
-the surface's edges, the few folds that this causes are removed, and the landmarks' weight is increased until they are
-met.
+The tetrahedra are as fine as the surface's edges. The map follows the motion from key to key (module ``continuation``),
+and then the landmarks' weight is increased until they are met.
 """
 
 from __future__ import annotations
@@ -19,26 +18,22 @@ from ..arrays import Bools, Floats
 from ..collision.box_tree import CrowdedError
 from ..collision.crossings import crossing_pairs
 from ..keys.embedding import Embedding
-from ..maps.representation import polar_decomposition
-from ..numerics.rotations import nearest_branch, rotation_vectors
 from ..support.progress import told
 from ..tets.mesh import TetMesh
-from ..tets.point_location import interpolation_matrix, locate
-from .continuation import follow_path
-from .fold_free import LANDMARK_WEIGHT, FoldFreeFitter
+from ..tets.point_location import interpolation_matrix
+from .continuation import FollowedPath, follow_path
+from .fold_free import LANDMARK_WEIGHT
 from .stiff_landmarks import StiffFitter
-from .unfolding import unfolded_nearby
 
 MET = 1e-4  # of the diagonal: a vertex is met if its distance is at most this
-_WEIGHTS = (1e5, 1e6, 1e7, 1e8)
-_ITERATIONS = (15, 15, 12, 6)  # largest number for each weight; up to four times as many for smaller meshes
-_MANY_TETS, _MOST_TIMES = 50_000, 4.0
+_WEIGHT_ON_THE_WAY = 1e6
+_WEIGHTS = (1e7, 1e8, 1e9, 1e10)
+_ITERATIONS = 12  # at most, for each weight
 _MORE_ROUNDS, _FEW, _PROGRESS = 6, 0.005, 0.9
-_REPAIR_ITERATIONS = 15
 # Of the diagonal. Beyond this distance, the force of a landmark no longer grows. Otherwise landmarks that cannot be
 # met, as where a key crosses itself, would keep others from being met.
 _STRONGEST_AT = 1e-3
-_LEAST_WEIGHT = 0.05  # relative to the mean
+_LEAST_LENGTH = 0.05  # relative to the mean
 _WEIGHT_AT_CROSSINGS = 1e-2  # relative to that of other landmarks
 
 
@@ -48,31 +43,24 @@ class MetKeys:
 
     Parameters
     ----------
-    mesh : TetMesh
     landmarks : (n, N) sparse
         Barycentric coordinates of the first key's vertices.
-    maps : (K + 1, N, 3)
-        Fold-free maps, evenly spaced in time, from the identity to the one that meets the second key.
-    turns : (M, 3)
-        Rotation vectors of the last map's tetrahedra, in the branch that the motion takes.
+    followed : FollowedPath
+        The maps along the way; the last one meets the second key.
     """
 
-    mesh: TetMesh
     landmarks: csr_array
-    maps: Floats
-    turns: Floats
+    followed: FollowedPath
 
 
-def meet_keys(
-    embedding: Embedding, coarse: TetMesh, mesh: TetMesh, targets: Sequence[Floats]
-) -> Generator[float, None, MetKeys]:
-    """Follow the motion with a coarse mesh and meet the second key with a fine one.
+def meet_keys(embedding: Embedding, mesh: TetMesh, targets: Sequence[Floats]) -> Generator[float, None, MetKeys]:
+    """Follow the motion and meet the second key.
 
     Parameters
     ----------
     embedding : Embedding
-    coarse, mesh : TetMesh
-        Tetrahedral meshes of the cube; the second is as fine as the surface.
+    mesh : TetMesh
+        A tetrahedral mesh of the cube, as fine as the surface.
     targets : sequence of (n, 3)
         Target positions of the vertices after each step, in cube units; the last is the second key.
 
@@ -82,28 +70,16 @@ def meet_keys(
         The fraction that is done, in [0, 1].
     """
     base = _weights(embedding)
-    coarse_landmarks = interpolation_matrix(coarse, embedding.key0)
-    way = follow_path(FoldFreeFitter(coarse, coarse_landmarks, base), targets)
-    followed = yield from told(way, lambda part: 0.1 * part)
-    followed.maps[-1] = StiffFitter(coarse, coarse_landmarks, _WEIGHTS[0] / LANDMARK_WEIGHT * base).fit(
-        followed.maps[-1], embedding.key1, _ITERATIONS[0]
-    )
-    fitter = StiffFitter(mesh, interpolation_matrix(mesh, embedding.key0), base)
-    carry = interpolation_matrix(coarse, mesh.points)
-    maps = np.empty((len(followed.maps), *mesh.points.shape))
-    maps[0] = mesh.points
-    for step in range(1, len(maps)):
-        maps[step] = _carried(fitter, carry, followed.maps[step], maps[step - 1])
-        yield 0.1 + 0.1 * step / len(maps)
+    fitter = StiffFitter(mesh, interpolation_matrix(mesh, embedding.key0), _WEIGHT_ON_THE_WAY / LANDMARK_WEIGHT * base)
+    followed = yield from told(follow_path(fitter, targets), lambda part: 0.6 * part)
     diagonal = embedding.pair.diagonal * embedding.scale
-    weights, times = base, min(max(_MANY_TETS / len(mesh.tets), 1.0), _MOST_TIMES)
     reachable = ~crossing_vertices(embedding)
-    before = len(reachable)
-    schedule = [*zip(_WEIGHTS, _ITERATIONS, strict=True), *[(_WEIGHTS[-2], _ITERATIONS[0])] * _MORE_ROUNDS]
-    for number, (weight, iterations) in enumerate(schedule):
+    mapped, weights, before = followed.maps[-1], base, len(reachable)
+    schedule = [*_WEIGHTS, *[_WEIGHTS[-1]] * _MORE_ROUNDS]
+    for number, weight in enumerate(schedule):
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
-        maps[-1] = fitter.fit(maps[-1], embedding.key1, round(times * iterations))
-        missed = np.linalg.norm(fitter.residuals(maps[-1], embedding.key1), axis=1) / diagonal
+        mapped = fitter.fit(mapped, embedding.key1, _ITERATIONS)
+        missed = np.linalg.norm(fitter.residuals(mapped, embedding.key1), axis=1) / diagonal
         left = int(np.count_nonzero(missed[reachable] > MET))
         if missed.max() <= 0.5 * MET:
             break
@@ -112,10 +88,8 @@ def meet_keys(
             break
         before = left
         weights = base * np.minimum(1.0, _STRONGEST_AT / np.maximum(missed, 1e-300))
-        yield 0.2 + 0.8 * min(1.0, (number + 1) / len(_WEIGHTS))
-    turned = rotation_vectors(polar_decomposition(mesh.jacobians(maps[-1])).rotation)
-    turns = nearest_branch(turned, followed.turns[locate(coarse, mesh.centroids)[0]])
-    return MetKeys(mesh, fitter.landmarks, maps, turns)
+        yield 0.6 + 0.4 * min(1.0, (number + 1) / len(_WEIGHTS))
+    return MetKeys(fitter.landmarks, followed.ending_with(mesh, mapped))
 
 
 def crossing_vertices(embedding: Embedding) -> Bools:
@@ -135,21 +109,13 @@ def crossing_vertices(embedding: Embedding) -> Bools:
     return found
 
 
-def _carried(fitter: FoldFreeFitter, carry: csr_array, coarse: Floats, before: Floats) -> Floats:
-    """A fold-free map (N, 3) close to a coarse one or, if its folds remain, between it and the previous map."""
-    mesh = fitter.mesh
-    values = np.where(mesh.on_cube_face, mesh.points, carry @ coarse)
-    found = unfolded_nearby(mesh, values)
-    return fitter.fit(before, fitter.landmarks @ values, _REPAIR_ITERATIONS) if found is None else found
-
-
 def _weights(embedding: Embedding) -> Floats:
     """(n,) weights of the vertices, with sum 1.
 
-    They are as the lengths around vertices, the roots of areas, so that tetrahedra of all sizes resist alike. Where a
-    key crosses itself they are small: what cannot be met must not hold up what is around it.
+    They are inverse to the areas around vertices, as the stiffness of tetrahedra of equal weights is to the squares of
+    their edges. Where a key crosses itself they are small: what cannot be met must not hold up what is around it.
     """
     lengths = np.sqrt(embedding.weights)
-    lengths = np.maximum(lengths, _LEAST_WEIGHT * lengths.mean())
-    weights = np.where(crossing_vertices(embedding), _WEIGHT_AT_CROSSINGS, 1.0) * lengths
+    lengths = np.maximum(lengths, _LEAST_LENGTH * lengths.mean())
+    weights = np.where(crossing_vertices(embedding), _WEIGHT_AT_CROSSINGS, 1.0) / lengths**2
     return np.asarray(weights / weights.sum())

@@ -77,6 +77,10 @@ class RigidMove:
         """Points (k, 3), carried along."""
         return np.asarray((points - self.centre) @ self._rotation.T + (self.centre + self.shift))
 
+    def undo(self, points: Floats) -> Floats:
+        """Points (k, 3), carried back."""
+        return np.asarray((points - (self.centre + self.shift)) @ self._rotation + self.centre)
+
     def undo_vectors(self, vectors: Floats) -> Floats:
         """Displacements (k, 3), turned back."""
         return np.asarray(vectors @ self._rotation)
@@ -114,7 +118,13 @@ class CalmAlignment:
         if not self._part:
             return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
         whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
-        return whole.scaled(self._part * _onset(time, self._inner))
+        return whole.scaled(self._part * self.onset(time))
+
+    def onset(self, time: float) -> float:
+        """The part of a move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
+        before = 1.0 - (1.0 - time) ** _ONSET if self._inner[0] else 1.0
+        after = 1.0 - time**_ONSET if self._inner[1] else 1.0
+        return before * after
 
 
 def _calm_part(embedding: Embedding) -> float:
@@ -145,10 +155,3 @@ def _calm_weights(travel: Floats, areas: Floats) -> Floats:
     weights += (NEARLY_STILL / np.maximum(travel, STILL_TOLERANCE)) ** 4
     weights *= areas
     return np.asarray(weights / weights.sum())
-
-
-def _onset(time: float, inner: tuple[bool, bool]) -> float:
-    """The part of the move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
-    before = 1.0 - (1.0 - time) ** _ONSET if inner[0] else 1.0
-    after = 1.0 - time**_ONSET if inner[1] else 1.0
-    return before * after

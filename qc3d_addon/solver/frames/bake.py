@@ -86,13 +86,3 @@ def require_chain(pairs: Sequence[KeyPair]) -> None:
     for left, right in pairwise(pairs):
         if not np.array_equal(left.key1, right.key0):
             raise InputError("The pairs of the chain do not meet: each must begin with the key that ended the last.")
-
-
-def split(times: Floats, count: int) -> tuple[Ints, Floats]:
-    """Index of the pair, and time within it, 0..1, for times along a chain of ``count`` pairs."""
-    along = times * count
-    # Times such as 1/3 are not exact in floating point; times that are meant to be keys must hit them.
-    whole = np.round(along)
-    along = np.where(np.abs(along - whole) < 1e-9, whole, along)
-    segments = np.minimum(np.floor(along), count - 1)
-    return segments.astype(np.int64), along - segments

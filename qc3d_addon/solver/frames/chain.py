@@ -19,9 +19,9 @@ from ..keys.keypair import KeyPair
 from ..settings import FrameOptions
 from ..support.memory import peak_memory_mb
 from ..support.progress import Progress, Steps, staged, timed
-from .bake import Bake, checked_times, require_chain, split
-from .easing import eased
+from .bake import Bake, checked_times, require_chain
 from .frame import Frame
+from .key_times import KeyTimes
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
 from .report import BakeReport, Folds, crossing_notes, embedding_notes, mirror_notes, welding_notes
@@ -44,7 +44,7 @@ def chain_frames(
     fits : sequence of FittedMap
         A fit for each pair; empty in mode ``straight``.
     times : (k,)
-        0 is the first key of all, 1 the last; every pair takes the same time before the easing.
+        0 is the first key of all, 1 the last; the options say when it is at the others.
     options : FrameOptions
         In mode ``natural`` velocities are continuous at the inner keys; the others turn corners there.
     collider : PosedCollider, optional
@@ -58,7 +58,7 @@ def chain_frames(
     wanted = checked_times(times)
     require_chain(pairs)
     seconds = _summed(fitted.seconds for fitted in fits)
-    segments, local = split(eased(wanted, options.easing), len(pairs))
+    segments, local = KeyTimes.of(options, len(pairs)).split(wanted)
     yield Progress("factor", 0.0)
     with timed(seconds, "factor"):
         makers = yield from staged("factor", frame_makers(pairs, fits, options))

@@ -16,9 +16,8 @@ from ..fit.fit_pair import fit_pair
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
 from ..settings import FitOptions, FrameOptions
 from ..support.progress import Steps, finish, numbered
-from .bake import split
 from .chain import chain_frames
-from .easing import eased
+from .key_times import KeyTimes
 from .modes import needs_fits
 
 
@@ -48,7 +47,7 @@ class Following:
     ) -> None:
         self._collider, self._times = collider, times
         self._fit_options = replace(fit_options, extra_turns=0)
-        self._easing = frame_options.easing
+        self._frame_options = replace(frame_options, mode="natural")
         self._through = _names(collider.shapes)
         self.notes: list[str] = []
         self._pairs: dict[Ends, KeyPair] = {}
@@ -78,16 +77,15 @@ class Following:
         for number, (ends, pair) in enumerate(self._pairs.items()):
             fitted[ends] = yield from numbered(fit_pair(pair, self._fit_options), number, len(self._pairs))
         along = list(pairwise(self._through))
-        options = FrameOptions(easing=self._easing)
         # The collider's frames take little time compared with the mesh's, so their progress is not reported.
-        frames = chain_frames([self._pairs[e] for e in along], [fitted[e] for e in along], self._times, options)
-        return finish(frames).frames
+        pairs, fits = [self._pairs[ends] for ends in along], [fitted[ends] for ends in along]
+        return finish(chain_frames(pairs, fits, self._times, self._frame_options)).frames
 
     def _straight(self) -> Floats:
         shapes = self._collider.shapes
         if not self._collider.moves:
             return np.broadcast_to(shapes[0], (len(self._times), *shapes[0].shape))
-        number, local = split(eased(self._times, self._easing), len(shapes) - 1)
+        number, local = KeyTimes.of(self._frame_options, len(shapes) - 1).split(self._times)
         time = local[:, None, None]
         return np.asarray((1.0 - time) * shapes[number] + time * shapes[number + 1])
 

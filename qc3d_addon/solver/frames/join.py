@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joins the pairs of a chain, so that the motion goes through the inner keys without a stop or a jerk.
 
-At an inner key, both adjacent pairs get the mean of their rates: angular velocities and strain rates of the triangles,
-and growth rates of the volumes. This keeps lengths. The small differences that remain between the velocities of the
-vertices are removed by displacing the vertices themselves.
+At an inner key, both adjacent pairs get the mean of their rates over the time that both take: angular velocities and
+strain rates of the triangles, and growth rates of the volumes. This keeps lengths, and, since no rate exceeds what the
+two pairs have together, a short pair beside a long one does not make the motion overshoot. The small differences that
+remain between the velocities of the vertices are removed by displacing the vertices themselves.
 """
 
 from __future__ import annotations
@@ -20,14 +21,24 @@ from .natural import NaturalFrames
 _VELOCITY_STEP = 0.02  # of a pair's time: second-order differences are accurate enough, and rounding is negligible
 
 
-def join(makers: Sequence[NaturalFrames]) -> list[NaturalFrames]:
-    """Give consecutive pairs of one mesh, each taking the same time, equal velocities on both sides of inner keys.
+def join(makers: Sequence[NaturalFrames], durations: Floats) -> list[NaturalFrames]:
+    """Give consecutive pairs of one mesh equal velocities on both sides of inner keys.
 
     Still vertices of a pair have no velocity at its keys, so that they stay in place.
+
+    Parameters
+    ----------
+    makers : sequence of NaturalFrames
+        Of each pair; their rates and velocities are per unit of the pair's own time.
+    durations : (pairs,)
+        Time that each pair takes, in any unit.
     """
+    shares = durations[:-1] / (durations[:-1] + durations[1:])
     rates = [list(maker.end_rates()) for maker in makers]
     for left in range(len(makers) - 1):
-        rates[left][1], rates[left + 1][0] = _shared_rates(makers, left, rates[left][1], rates[left + 1][0])
+        rates[left][1], rates[left + 1][0] = _shared_rates(
+            makers, left, rates[left][1], rates[left + 1][0], float(shares[left])
+        )
     last = len(makers) - 1
     joined = [
         maker.with_end_rates(first, second, (number > 0, number < last))
@@ -37,24 +48,31 @@ def join(makers: Sequence[NaturalFrames]) -> list[NaturalFrames]:
     slopes = [[np.zeros_like(velocity) for velocity in ends] for ends in velocities]
     for left in range(len(joined) - 1):
         before, after = velocities[left][1], velocities[left + 1][0]
-        mean = 0.5 * (before + after)
-        mean[joined[left].still | joined[left + 1].still] = 0.0
-        slopes[left][1], slopes[left + 1][0] = mean - before, mean - after
+        both = before + after
+        both[joined[left].still | joined[left + 1].still] = 0.0
+        slopes[left][1] = shares[left] * both - before
+        slopes[left + 1][0] = (1.0 - shares[left]) * both - after
     return [maker.with_end_slopes(first, second) for maker, (first, second) in zip(joined, slopes, strict=True)]
 
 
-def _shared_rates(makers: Sequence[NaturalFrames], left: int, before: Rates, after: Rates) -> tuple[Rates, Rates]:
-    """Rates on both sides of a key, averaged for the triangles that both sides have."""
+def _shared_rates(
+    makers: Sequence[NaturalFrames], left: int, before: Rates, after: Rates, share: float
+) -> tuple[Rates, Rates]:
+    """Rates on both sides of a key, averaged for the triangles that both sides have.
+
+    ``share`` is the part, 0..1, of the time of both pairs that the pair before the key takes.
+    """
     _, mine, others = np.intersect1d(makers[left].rows, makers[left + 1].rows, return_indices=True)
     rests: Bools = makers[left].resting[mine] | makers[left + 1].resting[others]
     spins, strains = [before.spin.copy(), after.spin.copy()], [before.strain.copy(), after.strain.copy()]
     for own, (first, second) in ((spins, (before.spin, after.spin)), (strains, (before.strain, after.strain))):
-        mean = 0.5 * (first[mine] + second[others])
-        mean[rests] = 0.0
-        own[0][mine], own[1][others] = mean, mean
+        both = first[mine] + second[others]
+        both[rests] = 0.0
+        own[0][mine], own[1][others] = share * both, (1.0 - share) * both
     growth = [before.growth, after.growth]
     if np.array_equal(makers[left].components, makers[left + 1].components):
-        growth = [0.5 * (before.growth + after.growth)] * 2
+        both = before.growth + after.growth
+        growth = [share * both, (1.0 - share) * both]
     return Rates(spins[0], strains[0], growth[0]), Rates(spins[1], strains[1], growth[1])
 
 

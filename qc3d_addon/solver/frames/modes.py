@@ -14,6 +14,7 @@ from ..keys.keypair import KeyPair
 from ..settings import FrameOptions, Mode
 from .frame import Frame
 from .join import join
+from .key_times import KeyTimes
 from .linear import LinearFrames
 from .natural import NaturalFrames
 from .straight import StraightFrames
@@ -59,4 +60,4 @@ def frame_makers(
     for number, fitted in enumerate(fits):
         makers.append(NaturalFrames(fitted))
         yield (number + 1) / (len(fits) + 1)
-    return join(makers) if len(makers) > 1 else makers
+    return join(makers, KeyTimes.of(options, len(makers)).durations) if len(makers) > 1 else makers

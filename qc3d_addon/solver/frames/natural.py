@@ -10,13 +10,11 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
-from ..numerics.rotation_unwrapping import Turning, swing_beside
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SurfacePath
@@ -25,7 +23,8 @@ from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
 from .mirror_image import MirrorImages
-from .volume_path import VolumePath
+from .straighter import Straighter, more_than
+from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
@@ -47,12 +46,12 @@ class NaturalFrames:
         embedding, mesh = fitted.embedding, fitted.mesh
         self._surface = fitted.surface_path
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
-        turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
+        self._turns = turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
         if fitted.options.extra_turns and not turns:
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         faces = fitted.pair.welded_faces
         with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
-            turning = _turning_inside(fitted, self._surface)
+            turning = turning_inside(fitted, self._surface)
             self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
@@ -145,14 +144,22 @@ class NaturalFrames:
             pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
             positions, crossings = pieces.apart(self._limit, times, positions, crossings)
         moves = [self._alignment.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
+        held = self.still
+        if any(crossings) and not self._turns:
+            positions, crossings, straight = self._straighter(times, positions, moves, crossings)
+            held = held | straight
         if resolver is not None:
             positions = yield from self._cleared(resolver, times, volumes, positions, moves)
+            held = self.still
             crossings = list(in_threads(self._limit.excess, positions))
-        made = in_threads(self._certified, zip(times.tolist(), volumes, positions, moves, crossings, strict=True))
-        return list(made)
+        moments = zip(times.tolist(), volumes, positions, moves, crossings, strict=True)
+        return list(in_threads(partial(self._certified, held), moments))
 
-    def _certified(self, moment: tuple[float, Floats, Floats, RigidMove, int | None]) -> Frame:
-        """The frame of a time, its map's values, its surface in the cube, where it goes and its excess of crossings."""
+    def _certified(self, held: Bools, moment: tuple[float, Floats, Floats, RigidMove, int | None]) -> Frame:
+        """The frame of a time, its map's values, its surface in the cube, where it goes and its excess of crossings.
+
+        ``held`` (n,) are the vertices that go straight.
+        """
         time, values, shape, move, crossings = moment
         # The maps that were fitted on the way lead nearer to the surface, and past most folds.
         found = self._volume.followed(time, values)
@@ -161,7 +168,7 @@ class NaturalFrames:
             found, repaired = values, False
         if repaired:
             found = self._fitted.unfolded(found, time)
-        positions = self._finished(shape, time, move)
+        positions = self._finished(shape, time, move, held)
         return Frame.of(self._fitted, positions, found, time, repaired, crossings, move)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
@@ -170,13 +177,16 @@ class NaturalFrames:
         shapes = self._shaped(self._surface, self._moments(maps, times))
         return maps, shapes, [self._limit.excess(shape) for shape in shapes]
 
-    def _finished(self, shape: Floats, time: float, move: RigidMove) -> Floats:
-        """Cube positions (n, 3) carried to the keys' coordinates; what both leave in place is there bit for bit."""
-        pair, still = self._fitted.pair, self.still
+    def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
+        """Cube positions (n, 3) carried to the keys' coordinates; what goes straight, ``held`` (n,), is exactly there.
+
+        Without ``held``, it is what both keys leave in place.
+        """
+        pair, held = self._fitted.pair, self.still if held is None else held
         positions = self._mirror_images.averaged(self._fitted.embedding.from_cube(move.apply(shape), time), time)
         if self._slopes is not None:
             positions += hermite(time, *self._slopes)
-        positions[still] = pair.key0[still] + time * (pair.key1 - pair.key0)[still]
+        positions[held] = pair.key0[held] + time * (pair.key1 - pair.key0)[held]
         return positions
 
     def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
@@ -227,6 +237,26 @@ class NaturalFrames:
             positions, excess = tried, remaining
         return positions, excess
 
+    def _straighter(
+        self, times: Floats, shapes: list[Floats], moves: list[RigidMove], excess: list[int | None]
+    ) -> tuple[list[Floats], list[int | None], Bools]:
+        """Go straight where that leaves fewer crossings; say where the straight blend still has fewer.
+
+        Also returns the vertices that go all the way straight (n,).
+        """
+        moments = times.tolist()
+        lines = [move.undo(self._fitted.embedding.straight(time)) for move, time in zip(moves, moments, strict=True)]
+        onsets = [self._alignment.onset(time) for time in moments]
+        found = Straighter(self._limit, self._surface, onsets).apart(shapes, lines, excess)
+        over = more_than(found.excess, found.straight_excess)
+        if over:
+            self.notes += (
+                f"{'A frame has' if len(over) == 1 else f'{len(over)} frames have'} up to {max(over)} more pairs of "
+                "triangles that cross than the straight blend; mode straight has fewer there, and worse lengths.",
+            )
+        shapes = [self._symmetric(shape, time) for shape, time in zip(found.shapes, moments, strict=True)]
+        return shapes, found.excess, np.asarray((found.part == 1.0) & (min(onsets) == 1.0) & (self._slopes is None))
+
     def _cleared(
         self,
         resolver: CollisionResolver,
@@ -267,13 +297,5 @@ class NaturalFrames:
         return positions
 
 
-def _turning_inside(fitted: FittedMap, surface: SurfacePath) -> Turning:
-    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with its nearest twist."""
-    triangles, twist = surface.deformation.faces, surface.turning.twist
-    if not twist.any():
-        return Turning(fitted.turns, np.zeros_like(fitted.turns))
-    centres = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
-    nearest = cKDTree(centres).query(fitted.mesh.centroids)[1]
-    twists = twist[nearest].any(axis=1)
-    swing = np.where(twists[:, None], swing_beside(fitted.turns, twist[nearest]), fitted.turns)
-    return Turning(swing, twist[nearest])
+def _frames(count: int) -> str:
+    return "A frame has" if count == 1 else f"{count} frames have"

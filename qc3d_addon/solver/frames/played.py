@@ -16,16 +16,16 @@ from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
 from ..settings import DENSE_STEPS, FrameOptions, PlayOptions
 from ..support.threads import in_threads
-from ..triangles.closed_volume import ClosedComponents
-from ..triangles.topology import sides, unique_edges, vertex_components
-from .bake import Bake, split
-from .easing import eased, uneased
+from .bake import Bake
+from .component_volumes import ComponentVolumes
+from .key_times import KeyTimes
 from .measures import worst_excess
 from .report import PlayedReport, crossing_notes
 from .weights import Weights, fewest_knots
 
 _LOOKED_AT = (0.25, 0.5, 0.75)  # places between two neighboring shapes at which what is played is measured
-_LEAST_VOLUME = 1e-6  # of the largest volume; a relative deviation of smaller ones means little
+_LOST_VOLUME = 0.001  # relative deviation beyond that of the computed motion; smaller ones cannot be seen
+_LEVELS = 3  # see ``Moments.denser``
 _SAME = 1e-5  # times that differ by less are equal
 
 
@@ -51,29 +51,51 @@ class Moments:
     @classmethod
     def of(cls, options: PlayOptions, frames: FrameOptions, pairs: int) -> Moments:
         """The moments for a control that goes through ``pairs`` pairs of keys."""
-        at_keys = uneased(np.linspace(0.0, 1.0, pairs + 1), frames.easing)
-        steps = DENSE_STEPS if options.tolerance > 0.0 else options.count + 1
-        between = np.arange(1, steps) / steps
-        shapes = np.concatenate([first + between * (second - first) for first, second in pairwise(at_keys)])
-        shapes = _distinct(np.concatenate([at_keys, shapes, options.also_at]))
+        key_times = KeyTimes.of(frames, pairs)
+        count = DENSE_STEPS - 1 if options.tolerance > 0.0 else options.count
+        others = np.concatenate([key_times.between(count), options.also_at])
+        others = others[np.abs(others[:, None] - key_times.at).min(axis=1) > _SAME]  # keys are met exactly
+        shapes = np.sort(np.concatenate([key_times.at, _distinct(others)]))
         times = shapes
         if not options.tolerance > 0.0:
             times = np.sort(np.concatenate([shapes, 0.5 * (shapes[1:] + shapes[:-1])]))
-        return cls(times, np.searchsorted(times, at_keys), np.searchsorted(times, shapes))
+        return cls(times, np.searchsorted(times, key_times.at), np.searchsorted(times, shapes))
 
     def chosen(self, options: PlayOptions, frames: FrameOptions, motion: Floats) -> tuple[Ints, list[int]]:
         """Choose shapes for a motion (k, n, 3): indices (c,) of their moments, and those of shapes with a corner."""
-        # Only natural motions have no corners at keys.
-        corners = self.keys[1:-1].tolist() if frames.mode != "natural" else []
-        everywhere = options.weights == "hats"
         shapes = self.shapes
         if options.tolerance > 0.0:
-            also = np.abs(self.times[:, None] - np.array(options.also_at)).argmin(axis=0)
-            wanted = [*self.keys.tolist(), *also.tolist()]
-            shapes = fewest_knots(self.times, motion, options.tolerance, wanted, None if everywhere else corners)
-        if everywhere:
-            return shapes, list(range(1, len(shapes) - 1))
-        return shapes, [shapes.tolist().index(corner) for corner in corners]
+            wanted = [*self.keys.tolist(), *self.also(options)]
+            corners = None if options.weights == "hats" else self._corners(frames)
+            shapes = fewest_knots(self.times, motion, options.tolerance, wanted, corners)
+        return shapes, self.corners(shapes, options, frames)
+
+    def denser(self, options: PlayOptions, levels: Sequence[int]) -> Ints:
+        """Indices (c,) of moments that become shapes, by the level of each pair.
+
+        Level 0 has the given number of in-betweens, level 1 those half-way between them and the keys, which are one
+        more and nearer to the keys, and level 2 all of both.
+        """
+        chosen = {*self.keys.tolist(), *self.also(options)}
+        for (first, last), level in zip(pairwise(self.keys.tolist()), levels, strict=True):
+            even = self.shapes[(self.shapes > first) & (self.shapes < last)]
+            inside = np.arange(first + 1, last)
+            chosen |= {*(even, np.setdiff1d(inside, even), inside)[level].tolist()}
+        return np.array(sorted(chosen), dtype=np.int64)
+
+    def also(self, options: PlayOptions) -> list[int]:
+        """Indices of the moments of the additional in-betweens."""
+        return list(np.abs(self.times[:, None] - np.array(options.also_at)).argmin(axis=0).tolist())
+
+    def corners(self, shapes: Ints, options: PlayOptions, frames: FrameOptions) -> list[int]:
+        """Indices, among these shapes (c,), of those at which the played path has a corner."""
+        if options.weights == "hats":
+            return list(range(1, len(shapes) - 1))
+        return [shapes.tolist().index(corner) for corner in self._corners(frames)]
+
+    def _corners(self, frames: FrameOptions) -> list[int]:
+        """Indices of the moments at which the motion has a corner: only natural motions have none at keys."""
+        return [] if frames.mode == "natural" else list(self.keys[1:-1].tolist())
 
 
 def played(
@@ -98,7 +120,11 @@ def played(
     options : PlayOptions
     frames : FrameOptions
     """
+    volumes = [ComponentVolumes(pair) for pair in pairs]
     chosen, corners = moments.chosen(options, frames, bake.frames)
+    if options.more and not options.tolerance > 0.0:
+        chosen = _keeping_volumes(bake, moments, volumes, options, frames)
+        corners = moments.corners(chosen, options, frames)
     shapes = bake.at(chosen)
     weights = Weights.smooth(shapes.times, corners)
     missed = np.linalg.norm(weights.played(shapes.frames, bake.times) - bake.frames, axis=2).max(axis=1, initial=0.0)
@@ -107,11 +133,11 @@ def played(
     shown = weights.played(shapes.frames, positions)
     crossings: list[int | None] = []
     stretch, folds = 0.0, 0
-    volumes: list[float] = []
+    lost: list[float] = []
     for number, pair in enumerate(pairs):
         members = np.flatnonzero(segments == number)
         stretch = max(stretch, worst_excess(pair, shown[members]).excess)
-        volumes += _volume_deviations(pair, shown[members], local[members])
+        lost += volumes[number].deviations(shown[members], local[members])
         crossings += _new_crossings(pair, shown[members])
         if fits:
             first, last = np.searchsorted(weights.knots, bake.times[moments.keys[number : number + 2]])
@@ -125,7 +151,7 @@ def played(
         distance=float(missed[worst]) / pairs[0].diagonal,
         distance_at=float(bake.times[worst]),
         worst_stretch=stretch,
-        volume=max(volumes, default=None),
+        volume=max(lost, default=None),
         folds=folds if fits else None,
         crossings=None if None in crossings else max((count or 0 for count in crossings), default=0),
     )
@@ -140,6 +166,36 @@ def played(
     return replace(shapes, report=replace(shapes.report, played=report, notes=notes))
 
 
+def _keeping_volumes(
+    bake: Bake,
+    moments: Moments,
+    volumes: Sequence[ComponentVolumes],
+    options: PlayOptions,
+    frames: FrameOptions,
+) -> Ints:
+    """Indices (c,) of the shapes: of each pair as few as play its volumes like the motion itself, from ``count`` on."""
+    segments, local = KeyTimes.of(frames, len(volumes)).split(bake.times)
+    most = []
+    for number, measured in enumerate(volumes):
+        members = np.flatnonzero(segments == number)
+        most.append(max(measured.deviations(bake.frames[members], local[members]), default=0.0) + _LOST_VOLUME)
+    levels = [0] * len(volumes)
+    while True:
+        chosen = moments.denser(options, levels)
+        weights = Weights.smooth(bake.times[chosen], moments.corners(chosen, options, frames))
+        positions, segments, local = _between(weights.knots, frames, len(volumes))
+        shown = weights.played(bake.frames[chosen], positions)
+        beyond = []
+        for number, measured in enumerate(volumes):
+            members = np.flatnonzero(segments == number)
+            lost = max(measured.deviations(shown[members], local[members]), default=0.0)
+            beyond.append(lost - most[number] if levels[number] < _LEVELS - 1 else 0.0)
+        worst = int(np.argmax(beyond))
+        if not beyond[worst] > 0.0:
+            return chosen
+        levels[worst] += 1
+
+
 def _distinct(times: Floats) -> Floats:
     """(k,) distinct times, sorted; times that differ by rounding only are equal."""
     ordered = np.sort(times)
@@ -149,23 +205,7 @@ def _distinct(times: Floats) -> Floats:
 def _between(knots: Floats, frames: FrameOptions, pairs: int) -> tuple[Floats, Ints, Floats]:
     """Positions (p,) between the knots, the indices of their pairs of keys, and their times within these pairs."""
     positions = (knots[:-1, None] + np.array(_LOOKED_AT) * np.diff(knots)[:, None]).ravel()
-    return positions, *split(eased(positions, frames.easing), pairs)
-
-
-def _volume_deviations(pair: KeyPair, shapes: Floats, times: Floats) -> list[float]:
-    """For each shape (p, n, 3), the largest relative deviation of a component's volume from the interpolated one."""
-    vertices, group = pair.welding
-    faces = group[pair.faces]
-    closed = ClosedComponents(faces, vertex_components(unique_edges(sides(faces)), len(vertices)))
-    first, second = (closed.volumes(key[vertices]) for key in (pair.key0, pair.key1))
-    known = np.abs(first) > _LEAST_VOLUME * max(float(np.abs(first).max(initial=0.0)), 1e-300)
-    found = []
-    for shape, time in zip(shapes, times, strict=True):
-        wanted = (1.0 - time) * first + time * second
-        usable = known & (np.abs(wanted) > _LEAST_VOLUME * np.abs(first))
-        deviation = np.abs(closed.volumes(shape[vertices]) - wanted)[usable] / np.abs(wanted[usable])
-        found += [float(deviation.max())] if usable.any() else []
-    return found
+    return positions, *KeyTimes.of(frames, pairs).split(positions)
 
 
 def _new_crossings(pair: KeyPair, shapes: Floats) -> list[int | None]:

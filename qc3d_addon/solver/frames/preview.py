@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..settings import Easing
-from .easing import eased
+from .key_times import KeyTimes
 from .weights import Weights
 
 Singles = NDArray[np.float32]
+EVEN = KeyTimes(np.array([0.0, 1.0]))  # two keys
 
 
 class PreviewCurve:
@@ -23,15 +23,14 @@ class PreviewCurve:
     Parameters
     ----------
     frames : (pairs · d + 1, n, 3)
-        Evenly spaced frames without easing, from the first key to the last, with d >= 3 steps between every two keys.
-    pairs : int
-        Number of pairs of keys that the frames go through.
-    easing : Easing
-        Applied by the curve, because the frames must include the keys, where the motion may have corners.
+        Frames without easing, from the first key to the last, with d >= 3 even steps between every two keys.
+    key_times : KeyTimes
+        When the curve is at the keys. It also applies the easing, because the frames must include the keys, where the
+        motion may have corners.
     """
 
-    def __init__(self, frames: Floats, pairs: int = 1, easing: Easing = "linear") -> None:
-        self._easing = easing
+    def __init__(self, frames: Floats, key_times: KeyTimes = EVEN) -> None:
+        self._key_times, pairs = key_times, key_times.pairs
         self._steps = (len(frames) - 1) // pairs
         operator = _slope_operator(self._steps)
         self._frames = frames.astype(np.float32)
@@ -53,8 +52,7 @@ class PreviewCurve:
 
     def at(self, time: float) -> Singles:
         """(n, 3) positions at ``time``, clamped to 0..1; the frames themselves, bit for bit, at their times."""
-        passed = eased(np.clip([time], 0.0, 1.0), self._easing).item()
-        along = passed * (len(self._frames) - 1)
+        along = self._key_times.along(np.clip([time], 0.0, 1.0)).item() * self._steps
         before = min(int(along), len(self._frames) - 2)
         part = np.float32(along - before)
         if part == 0.0 or part == 1.0:

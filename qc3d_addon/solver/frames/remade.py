@@ -28,6 +28,7 @@ from ..settings import FitOptions, FrameOptions
 from ..support.memory import machine_limit_mb
 from ..support.progress import Steps, told
 from .bake import evenly_spaced
+from .key_times import KeyTimes
 from .task import Task, carry_out
 
 T = TypeVar("T")
@@ -49,7 +50,7 @@ class Settings:
     at : tuple of int
         The numbers of the frames that are keys; the first is 0, the last that of the last frame.
     times : tuple of float
-        The frames' times, or none where these are evenly spaced.
+        The frames' times, or none where these are as usual: as many between every two keys.
     fit_options, frame_options
     """
 
@@ -77,7 +78,10 @@ class Settings:
             content = json.loads(text)
             at = tuple(content.pop("at"))
             times = tuple(map(float, content.pop("times", ())))
-            found = cls(at, times, FitOptions(**content.pop("fit", {})), FrameOptions(**content.pop("frame", {})))
+            frame = content.pop("frame", {})
+            if "via_at" in frame:
+                frame["via_at"] = tuple(frame["via_at"])
+            found = cls(at, times, FitOptions(**content.pop("fit", {})), FrameOptions(**frame))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
             raise InputError(_DAMAGED) from error
         numbers = [type(number) is int for number in at]
@@ -92,7 +96,7 @@ class Settings:
         That is one of a mirrored half, with colliders, or without a frame at each key.
         """
         keys = len(task.through) - 1
-        at = np.searchsorted(task.times, np.arange(keys + 1) / keys - 1e-12)
+        at = np.searchsorted(task.times, KeyTimes.of(task.frame_options, keys).at - 1e-12)
         pairs = list(task.pairs.values())
         whole = len(at) == len(set(at.tolist())) and at[0] == 0 and at[-1] == len(frames) - 1
         if task.collider is not None or task.play is not None or any(pair.planes for pair in pairs) or not whole:
@@ -100,7 +104,7 @@ class Settings:
         shapes = [pairs[0].key0] + [task.pairs[ends].key1 for ends in zip(task.through, task.through[1:], strict=False)]
         if not all(np.array_equal(frames[number], shape) for number, shape in zip(at, shapes, strict=True)):
             return None
-        even = np.array_equal(task.times, evenly_spaced(len(frames) - 2))
+        even = np.array_equal(task.times, _usual_times(len(frames) - 1, keys, task.frame_options))
         numbers = tuple(int(number) for number in at)
         return cls(numbers, () if even else tuple(task.times.tolist()), task.fit_options, task.frame_options)
 
@@ -136,7 +140,7 @@ def remade(source: Source, keys: Floats, settings: Settings, polygons: Ints | No
         names,
         settings.fit_options,
         settings.frame_options,
-        settings.times or evenly_spaced(count - 1),
+        settings.times or _usual_times(count, len(keys), settings.frame_options),
         polygons=np.arange(len(source.cells)) if polygons is None else polygons,
         mirror="none",
     )
@@ -144,6 +148,12 @@ def remade(source: Source, keys: Floats, settings: Settings, polygons: Ints | No
     bake = (yield from carry_out(task)).bake
     assert bake is not None
     return bake.frames[1:]
+
+
+def _usual_times(count: int, pairs: int, options: FrameOptions) -> Floats:
+    """(count + 1,) the times of as many in-betweens between every two keys, or evenly spaced ones."""
+    each, left = divmod(count, pairs)
+    return evenly_spaced(count - 1) if left else KeyTimes.of(options, pairs).between(each - 1)
 
 
 def small_bake(frames: Floats, faces: Ints, error: float, settings: Settings, polygons: Ints | None = None) -> Work:

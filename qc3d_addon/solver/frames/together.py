@@ -15,8 +15,8 @@ from ..errors import InputError
 from ..keys.halves import held_on_planes
 from ..keys.keypair import Ends, KeyPair
 from ..settings import FrameOptions
-from .bake import Bake, split
-from .easing import eased
+from .bake import Bake
+from .key_times import KeyTimes
 from .measures import worst_stretch
 
 
@@ -103,7 +103,7 @@ class Together:
         through : sequence of str
             Names of the keys from the first to the last.
         """
-        segments, local = split(eased(bake.times, options.easing), len(through) - 1)
+        segments, local = KeyTimes.of(options, len(through) - 1).split(bake.times)
         found = []
         for mesh, start, end in zip(self._meshes, self._starts[:-1], self._starts[1:], strict=True):
             along = [mesh.pairs[ends] for ends in pairwise(through)]

@@ -9,16 +9,19 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
+from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
+from ..fit.fitted_map import FittedMap
 from ..maps.representation import polar_decomposition
 from ..numerics.assembly import StiffnessPattern, stiffness_elements
 from ..numerics.nested_dissection import elimination_order, factored
-from ..numerics.rotation_unwrapping import Turning
+from ..numerics.rotation_unwrapping import Turning, swing_beside
 from ..numerics.rotations import products
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
 from ..support.threads import batches, in_threads
+from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
 
 _MAPS_AT_ONCE = 4  # solved together; more would wait for each other and gain little
@@ -87,3 +90,15 @@ class VolumePath:
         before = min(int(time * steps), steps - 1)
         part = time * steps - before
         return np.asarray(values + (1.0 - part) * self._missed[before] + part * self._missed[before + 1])
+
+
+def turning_inside(fitted: FittedMap, surface: SurfacePath) -> Turning:
+    """How tetrahedra turn: as the fit followed them, or, where the surface twists, with its nearest twist."""
+    triangles, twist = surface.deformation.faces, surface.turning.twist
+    if not twist.any():
+        return Turning(fitted.turns, np.zeros_like(fitted.turns))
+    centres = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
+    nearest = cKDTree(centres).query(fitted.mesh.centroids)[1]
+    twists = twist[nearest].any(axis=1)
+    swing = np.where(twists[:, None], swing_beside(fitted.turns, twist[nearest]), fitted.turns)
+    return Turning(swing, twist[nearest])

@@ -25,6 +25,7 @@ Ends = tuple[str, str]
 
 # Between these sizes, cubes of lengths and squares of areas stay within the range of double precision.
 _SMALLEST, LARGEST = 1e-75, 1e75
+_FARTHEST = 0.25 * float(np.finfo(np.float64).max)  # so that twice the size of a key is still a number
 _MOST_GROWTH = 1e10  # of the sizes of two keys: beyond it their common scale leaves the smaller one too few digits
 # Coincident vertices may differ by this many steps of single precision at the largest coordinate, since several
 # roundings add up; but never by more than a fraction of the key's size, however far from the origin the mesh is.
@@ -84,7 +85,7 @@ class KeyPair:
         Raises
         ------
         InputError
-            If shapes disagree, a coordinate is not finite, an index is out of range, or there are no vertices.
+            If shapes disagree, a coordinate is not finite or within a factor of 4 of that, an index is out of range, or there are no vertices.
         """
         first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
         if first.shape != second.shape:
@@ -247,6 +248,11 @@ def _positions(key: ArrayLike, name: str) -> Floats:
         raise InputError(
             f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
             f"({bad.size} such vertices); repair the key first."
+        )
+    largest = float(np.abs(positions).max(initial=0.0))
+    if largest > _FARTHEST:
+        raise InputError(
+            f"The {name} key has coordinates up to {largest:.0e}, whose differences are no numbers; repair the key first."
         )
     return positions
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InputError
 from ..numerics.grouped_sums import sums_by_label
-from ..triangles.closed_volume import ClosedComponents
+from ..triangles.closed_volume import AS_FULL, ClosedComponents
 from ..triangles.geometry import areas
 from ..triangles.topology import sides, unique_edges, vertex_components
 from .keypair import KeyPair
@@ -21,9 +21,6 @@ _MOST_SHARE = 0.5
 # Volumes below these fractions of the cubed size may be nothing but rounding: the first decides about the share of the
 # surface, the second about the parts that are counted in the report.
 _LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
-# A part that is turned inside out still encloses, relative to its area, at least this fraction of its former volume. A
-# part that crosses itself all over or is flattened encloses almost none, and the sign of its volume means nothing.
-_AS_FULL = 0.3
 
 
 @dataclass(frozen=True)
@@ -95,8 +92,8 @@ def reversal(pair: KeyPair) -> Reversal:
     count = volumes.shape[1]
     flips, least = volumes[0] * volumes[1] < 0.0, np.abs(volumes).min(axis=0)
     surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
-    full = np.abs(volumes) / np.maximum(surface, 1e-100) ** 1.5
-    is_real = full[1] > _AS_FULL * full[0]
+    full = np.abs([closed.fullness(key) for key in keys])
+    is_real = full[1] > AS_FULL * full[0]
     is_reversed = flips & (least > _LEAST_VOLUME)
     is_part = flips & (least > _LEAST_OF_A_PART)
     total = max(float(surface[0].sum()), 1e-300)

@@ -26,6 +26,14 @@ class Analysis:
     Parameters
     ----------
     mapping : Mapping
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> found = Analysis(Mapping.checked(corners, [[0, 1, 2, 3]], corners * [3.0, 2.0, 0.5]))
+    >>> found.eigenvalues.round(12), found.measures["volume_ratio"].round(12)
+    (array([[3. , 2. , 0.5]]), array([3.]))
     """
 
     mapping: Mapping

@@ -21,7 +21,16 @@ _FLAT = 1e-14
 
 
 def singular_values(jacobians: Floats) -> Floats:
-    """(m, 3) singular values a >= b >= |c| of Jacobians (m, 3, 3); c < 0 where the map is folded."""
+    """(m, 3) singular values a >= b >= |c| of Jacobians (m, 3, 3); c < 0 where the map is folded.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> singular_values(np.diag([0.5, 3.0, 2.0])[None])
+    array([[3. , 2. , 0.5]])
+    >>> singular_values(np.diag([1.0, 1.0, -1.0])[None])  # a mirror image is folded
+    array([[ 1.,  1., -1.]])
+    """
     values = np.linalg.svd(jacobians, compute_uv=False)
     values[:, 2] *= np.where(determinants(jacobians) < 0.0, -1.0, 1.0)
     return np.asarray(values)
@@ -32,6 +41,12 @@ def approximate_singular_values(jacobians: Floats) -> Floats:
 
     The eigenvalues of JᵀJ in closed form (Smith 1961, "Eigenvalues of a symmetric 3 x 3 matrix"); the smallest follows
     from the determinant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> approximate_singular_values(np.diag([0.5, 3.0, 2.0])[None]).round(6)
+    array([[3. , 2. , 0.5]])
     """
     metric = jacobians.transpose(0, 2, 1) @ jacobians
     mean = np.einsum("kii->k", metric) / 3.0
@@ -47,22 +62,50 @@ def approximate_singular_values(jacobians: Floats) -> Floats:
 
 
 def volume_ratio(values: Floats) -> Floats:
-    """(m,) abc for singular values (m, 3): volume after the map over volume before; zero or negative at folds."""
+    """(m,) abc for singular values (m, 3): volume after the map over volume before; zero or negative at folds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> volume_ratio(np.array([[3.0, 2.0, 0.5]]))
+    array([3.])
+    """
     return np.asarray(values.prod(axis=1))
 
 
 def dilatation(values: Floats) -> Floats:
-    """(m,) K = a/c for singular values (m, 3): at least 1, infinite at folds."""
+    """(m,) K = a/c for singular values (m, 3): at least 1, infinite at folds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> dilatation(np.array([[3.0, 2.0, 0.5], [2.0, 2.0, 2.0], [1.0, 1.0, 0.0]]))
+    array([ 6.,  1., inf])
+    """
     return _over(values[:, 0], values[:, 2])
 
 
 def outer_dilatation(values: Floats) -> Floats:
-    """(m,) K_O = a² / (bc) for singular values (m, 3): at least 1, infinite at folds; K <= K_O <= K²."""
+    """(m,) K_O = a² / (bc) for singular values (m, 3): at least 1, infinite at folds; K <= K_O <= K².
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> outer_dilatation(np.array([[3.0, 2.0, 0.5]]))
+    array([9.])
+    """
     return _over(values[:, 0] ** 2, values[:, 1] * values[:, 2])
 
 
 def inner_dilatation(values: Floats) -> Floats:
-    """(m,) K_I = ab / c² for singular values (m, 3): at least 1, infinite at folds; K <= K_I <= K²."""
+    """(m,) K_I = ab / c² for singular values (m, 3): at least 1, infinite at folds; K <= K_I <= K².
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> inner_dilatation(np.array([[3.0, 2.0, 0.5]]))
+    array([24.])
+    """
     return _over(values[:, 0] * values[:, 1], values[:, 2] * np.abs(values[:, 2]))
 
 
@@ -75,6 +118,13 @@ class TriangleStretches:
         The shape that other shapes are compared with.
     faces : (m, 3) int64
         Triangles; the ratios of those without an area in ``rest`` are NaN.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> TriangleStretches(corners, np.array([[0, 1, 2]])).of(corners * [2.0, 0.5, 1.0])
+    array([[2. , 0.5]])
     """
 
     def __init__(self, rest: Floats, faces: Ints) -> None:
@@ -99,7 +149,14 @@ class TriangleStretches:
 
 
 def extreme_stretch(ratios: Floats) -> Floats:
-    """(m,) of each pair of largest and smallest length ratio (m, 2), the one farther from 1 on a logarithmic scale."""
+    """(m,) of each pair of largest and smallest length ratio (m, 2), the one farther from 1 on a logarithmic scale.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> extreme_stretch(np.array([[2.0, 0.9], [1.1, 0.5]]))
+    array([2. , 0.5])
+    """
     largest, smallest = ratios.T
     with np.errstate(divide="ignore"):
         return np.asarray(np.where(np.log(largest) >= -np.log(smallest), largest, smallest))

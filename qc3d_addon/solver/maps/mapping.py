@@ -31,6 +31,14 @@ class Mapping:
         The domain.
     values : (N, 3)
         Images of the vertices.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> mapping = Mapping.checked(corners, [[0, 1, 2, 3]], 2 * corners)
+    >>> mapping.stretch[0].diagonal(), mapping.folds
+    (array([2., 2., 2.]), 0)
     """
 
     mesh: TetMesh
@@ -88,6 +96,13 @@ def checked_mesh(points: ArrayLike, tets: ArrayLike) -> TetMesh:
     ------
     InputError
         If shapes disagree, a coordinate is not finite, an index is out of range, or a tetrahedron is flat.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> checked_mesh(corners, [[0, 2, 1, 3]]).tets  # given the other way round
+    array([[0, 1, 2, 3]])
     """
     vertices = _coordinates(points, "vertices")
     corners = np.asarray(tets)

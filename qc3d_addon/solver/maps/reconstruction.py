@@ -45,6 +45,16 @@ def reconstruct(mesh: TetMesh, stretch: Floats, conditions: Conditions) -> Mappi
     ReconstructionError
         If shapes disagree, a stretch is not symmetric positive definite, the conditions do not determine the map, or
         the iteration does not converge.
+
+    Examples
+    --------
+    >>> from qc3d_addon.solver.maps.boundary_conditions import Conditions
+    >>> from qc3d_addon.solver.tets.kuhn_grid import kuhn_grid
+    >>> grid = kuhn_grid(2)
+    >>> mapping = Mapping(grid, grid.points + 0.1 * grid.points[:, [1, 2, 0]])
+    >>> conditions = Conditions.fixed_boundary(grid, mapping.values)
+    >>> bool(abs(reconstruct(grid, mapping.stretch, conditions).values - mapping.values).max() < 1e-12)
+    True
     """
     if stretch.shape != (len(mesh.tets), 3, 3):
         raise ReconstructionError(

@@ -32,6 +32,14 @@ def polar_decomposition(jacobians: Floats) -> Polar:
     """Polar decomposition of Jacobians (M, 3, 3) into a rotation and a symmetric stretch.
 
     If det J > 0, the stretch is positive definite; on a folded element, its smallest eigenvalue is negative.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> rotation, stretch = polar_decomposition((turn @ np.diag([2.0, 1.0, 0.5]))[None])
+    >>> bool(np.allclose(rotation[0], turn)), stretch[0].diagonal().round(12)
+    (True, array([2. , 1. , 0.5]))
     """
     rotation = closest_rotations(jacobians)
     stretch = rotation.transpose(0, 2, 1) @ jacobians
@@ -39,12 +47,28 @@ def polar_decomposition(jacobians: Floats) -> Polar:
 
 
 def upper_triangle(stretch: Floats) -> Floats:
-    """(M, 6) upper triangles xx, xy, xz, yy, yz, zz of symmetric matrices (M, 3, 3): the first six-number form."""
+    """(M, 6) upper triangles xx, xy, xz, yy, yz, zz of symmetric matrices (M, 3, 3): the first six-number form.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> upper_triangle(np.array([[[2.0, 0.1, 0.2], [0.1, 1.0, 0.3], [0.2, 0.3, 0.5]]]))
+    array([[2. , 0.1, 0.2, 1. , 0.3, 0.5]])
+    """
     return stretch[:, _ROWS, _COLUMNS]
 
 
 def from_upper_triangle(numbers: Floats) -> Floats:
-    """(M, 3, 3) symmetric matrices from the first six-number form (M, 6)."""
+    """(M, 3, 3) symmetric matrices from the first six-number form (M, 6).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from_upper_triangle(np.array([[2.0, 0.1, 0.2, 1.0, 0.3, 0.5]]))
+    array([[[2. , 0.1, 0.2],
+            [0.1, 1. , 0.3],
+            [0.2, 0.3, 0.5]]])
+    """
     stretch = np.empty((len(numbers), 3, 3))
     stretch[:, _ROWS, _COLUMNS] = numbers
     stretch[:, _COLUMNS, _ROWS] = numbers
@@ -56,6 +80,12 @@ def eigen_form(stretch: Floats) -> Floats:
 
     P = W diag(a, b, c) Wᵀ with the rotation W = Rz(alpha) Ry(beta) Rx(gamma). Angles are in radians, alpha and gamma in
     [-pi, pi], beta in [-pi/2, pi/2]. If det W = -1, its last column is negated, which does not change P.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> eigen_form(np.diag([1.0, 2.0, 0.5])[None])[0, :3]
+    array([2. , 1. , 0.5])
     """
     values, vectors = np.linalg.eigh(stretch)
     values, vectors = values[:, ::-1], vectors[:, :, ::-1].copy()
@@ -71,7 +101,14 @@ def eigen_form(stretch: Floats) -> Floats:
 
 
 def from_eigen_form(numbers: Floats) -> Floats:
-    """(M, 3, 3) symmetric matrices from the second six-number form (M, 6)."""
+    """(M, 3, 3) symmetric matrices from the second six-number form (M, 6).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from_eigen_form(np.array([[2.0, 1.0, 0.5, 0.0, 0.0, 0.0]]))[0].diagonal()
+    array([2. , 1. , 0.5])
+    """
     cosine, sine = np.cos(numbers[:, 3:]).T, np.sin(numbers[:, 3:]).T
     (ca, cb, cg), (sa, sb, sg) = cosine, sine
     vectors = np.empty((len(numbers), 3, 3))
@@ -91,6 +128,12 @@ def conductivity(stretch: Floats) -> Floats:
     ------
     ReconstructionError
         If a stretch (M, 3, 3) is not positive definite, which means that the element is folded or collapsed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> conductivity(np.diag([2.0, 1.0, 1.0])[None])[0].diagonal()
+    array([0.5, 2. , 2. ])
     """
     determinant = determinants(stretch)
     trace = np.einsum("kii->k", stretch)

@@ -16,7 +16,7 @@ from .delaunay import delaunay_mesh
 from .poisson_disk import RESOLUTIONS
 from .tetwild import MARGIN, tetwild_mesh
 from .tetwild_loading import unavailable_reason
-from .vertex_mesh import FINE_SHARE, vertex_mesh
+from .vertex_mesh import vertex_mesh
 
 # As a fraction of the cube's volume. A tetrahedron with edges of 0.01 and this volume is flat up to rounding.
 SMALLEST_VOLUME = 1e-14
@@ -41,7 +41,7 @@ class FilledCube:
     notes: tuple[str, ...]
 
 
-def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = FINE_SHARE) -> FilledCube:
+def fill_cube(points: Floats, faces: Ints, options: FitOptions, stretches: Floats | None = None) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
     The surface's vertices do not become vertices of the mesh: its resolution depends on ``options.quality``, not on
@@ -55,6 +55,8 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = F
         Triangles; they may be open, non-manifold, crossing or degenerate, and there may be none.
     options : FitOptions
         Its quality, engine, seed and time limit.
+    stretches : (n,), optional
+        How many times longer the edges at each vertex are in the second key; quality ``exact`` is finer there.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, share: float = F
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
     if options.quality == "exact":
-        mesh = vertex_mesh(points, faces, share, options.seed)
+        mesh = vertex_mesh(points, faces, options.seed, stretches)
         require_filled_cube(mesh)
         return FilledCube(mesh, "delaunay", ())
     resolution = RESOLUTIONS[options.quality].beside(points, faces)

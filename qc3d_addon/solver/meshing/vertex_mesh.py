@@ -3,8 +3,8 @@
 """Tetrahedra as fine as a surface's edges: with a sample beside every vertex, a map can meet all vertices.
 
 A piecewise linear map can meet the vertices inside its tetrahedra if it has a degree of freedom for each. A sample
-beside every vertex ensures this, also where edges are short, as at fingers and lips. Away from the surface the
-tetrahedra grow.
+beside every vertex ensures this, also where edges are short, as at fingers and lips. Where the map stretches the
+surface it needs more of them, to follow the surface between its vertices. Away from the surface the tetrahedra grow.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from ..triangles.topology import without_piles
 from .poisson_disk import RESOLUTIONS, SizeField, sample_cube, thin
 from .slivers import Effort, sliver_free
 
-# Spacing of samples at the surface, in local edge lengths: for the map that follows the motion, and for the one that
-# meets the keys.
-COARSE_SHARE, FINE_SHARE = 2.0, 0.7
+_SHARE = 0.7  # spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample
+_MOST_FINER = 3.0  # where the surface is stretched, the spacing is divided by the root of its stretch, and at most this
 _NEAREST = 6  # nearest vertices whose mean distance defines the local edge length
 # Much nearer vertices belong to another sheet, across a gap that has to be resolved. Factor on their distance.
 _GAP = 1.6
 _SLOPE = 0.6  # growth of the distance between samples away from the surface
-_APART = 0.6  # vertices nearer than this part of the local distance share a sample, with a share below 1
+_APART = 0.6  # vertices nearer than this part of the local distance share a sample
 # Samples lie beside the vertices, by this part of the local distance: the four corners of every quad would make a flat
 # tetrahedron otherwise.
 _BESIDE = 0.15
@@ -35,7 +34,7 @@ _WIDEST_CELL = 1.0
 _EFFORT = Effort(sweeps=2, rounds=6, angle=5.0)
 
 
-def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh:
+def vertex_mesh(points: Floats, faces: Ints, seed: int, stretches: Floats | None = None) -> TetMesh:
     """Fill the cube with Delaunay tetrahedra whose size at the surface follows the local length of edges.
 
     The same input and seed give the same mesh.
@@ -46,16 +45,14 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
         Vertices strictly inside the cube.
     faces : (m, 3) int64
         Triangles, in any state; may be empty.
-    share : float
-        Spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample.
     seed : int
+    stretches : (n,), optional
+        How many times longer the edges at each vertex are in the second key.
     """
     rng = np.random.default_rng(seed)
-    size = size_around(points, share)
+    size = size_around(points, np.ones(len(points)) if stretches is None else stretches)
     vertices = rng.permutation(points[without_piles(points, 2)])
-    # A coarse mesh has to find its way, for which it must not be finer than it looks.
-    apart = _APART if share < 1.0 else 1.0
-    vertices = vertices[thin(vertices, apart * size(vertices))]
+    vertices = vertices[thin(vertices, _APART * size(vertices))]
     surface = np.concatenate([vertices, _between(vertices, points, faces, size, rng)])
     direction = rng.normal(size=surface.shape)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -64,25 +61,27 @@ def vertex_mesh(points: Floats, faces: Ints, share: float, seed: int) -> TetMesh
     return sliver_free(samples, size, rng, _EFFORT, in_place=8 + len(surface))
 
 
-def size_around(points: Floats, share: float) -> SizeField:
-    """The spacing of samples around vertices (n, 3), nowhere larger than with quality ``normal``."""
+def size_around(points: Floats, stretches: Floats) -> SizeField:
+    """The spacing of samples around vertices (n, 3) with stretches (n,), nowhere larger than with ``normal``."""
     normal = RESOLUTIONS["normal"]
-    places = np.unique(points, axis=0)
+    places, place = np.unique(points, axis=0, return_inverse=True)
     tree = cKDTree(places)
     distances, neighbours = tree.query(places, k=min(_NEAREST + 1, len(places)))
     distances = np.asarray(distances, dtype=np.float64).reshape(len(places), -1)
     if distances.shape[1] == 1:
         return normal.around(places)
+    finer = np.ones(len(places))
+    np.maximum.at(finer, place.ravel(), np.sqrt(np.clip(stretches, 1.0, _MOST_FINER**2)))
     beside = distances[:, 1:]
-    local = share * np.minimum(beside.mean(axis=1), _GAP * beside[:, 0])
+    local = _SHARE / finer * np.minimum(beside.mean(axis=1), _GAP * beside[:, 0])
     for _ in range(_NEAREST):
         local = np.minimum(local, (local[neighbours] + _SLOPE * distances).min(axis=1))
-    coarsest = max(1.0, min(share, 1.5)) * normal.spacing
 
     def size(positions: Floats) -> Floats:
         far, nearest = (np.asarray(found) for found in tree.query(positions, k=min(4, len(places))))
         graded = (local[nearest] + _SLOPE * far).min(axis=1)
-        return np.minimum(np.minimum(graded, coarsest + normal.slope * far[:, 0]), normal.largest, dtype=np.float64)
+        coarsest = np.minimum(normal.spacing + normal.slope * far[:, 0], normal.largest)
+        return np.minimum(graded, coarsest, dtype=np.float64)
 
     return size
 

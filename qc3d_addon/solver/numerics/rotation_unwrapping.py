@@ -30,6 +30,9 @@ _FAIR_SHARE = 0.02
 _DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
 # Parts that turn by less than this short of half a turn, or beyond it, have two ways of about the same length.
 _HALF_TURN = np.radians(30.0)
+# Relative rotations of a loose part and the surface beside it, up to which the part is taken to be fixed there, like a
+# button on a sleeve. Two wings beat in opposite directions: neither tells anything about the other.
+_ALIKE = np.radians(60.0)
 _MEAN_STEPS = 30  # a cap: rotations that are spread all around may have no unique mean
 _MEAN_FOUND = 1e-13  # radians; about the rounding of rotation vectors
 
@@ -102,8 +105,8 @@ def consistent_turning(
     into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
 
     In each part the element that turns least takes the short way round; in a part with still vertices the one whose
-    rotation is nearest to ``rest``. A part without still vertices, such as a button on a sleeve, takes the branch of
-    the nearest element of the largest part.
+    rotation is nearest to ``rest``. A part without still vertices that turns like the nearest element of the largest
+    part, such as a button on a sleeve, takes its branch.
     """
     count = len(turns)
     if not count:
@@ -117,7 +120,7 @@ def consistent_turning(
         rests = ~loose & (angles < 0.5 * np.pi)
         started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
     forest = forest.rooted(angles)
-    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, loose)
+    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, weights, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
@@ -145,6 +148,24 @@ def half_turned(turning: Turning, weights: Floats, labels: Ints, rest: Floats) -
     mean = np.linalg.norm(means_by_label(labels, turning.swing - rest, weights), axis=1)
     twisted = sums_by_label(labels, turning.twist.any(axis=1).astype(np.float64)) > 0.0
     return np.flatnonzero((np.abs(mean - np.pi) < _HALF_TURN) & ~twisted)
+
+
+def mean_turns(turning: Turning, weights: Floats, labels: Ints, count: int) -> Floats:
+    """(count, 3) weighted mean of each part's rotation vectors, radians; not a number where a part has no elements.
+
+    Parameters
+    ----------
+    turning : Turning
+    weights : (m,)
+        Positive weights of the elements.
+    labels : (m,) int64
+        Part of every element.
+    count : int
+        Number of parts.
+    """
+    means = means_by_label(labels, turning.swing + turning.twist, weights, count)
+    means[np.bincount(labels, minlength=count) == 0] = np.nan
+    return means
 
 
 def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
@@ -181,13 +202,15 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     return np.asarray(rotation_vectors(mean[None])[0])
 
 
-def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, loose: Bools) -> Floats:
-    """Rotation vectors (m, 3) with every loose part moved to the branch nearest to that of the largest part."""
-    largest = forest.labels == np.argmax(np.bincount(forest.labels))
+def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, weights: Floats, loose: Bools) -> Floats:
+    """Rotation vectors (m, 3) with every loose part that turns like the largest part beside it on the same branch."""
+    largest = forest.labels == np.argmax(sums_by_label(forest.labels, weights))
     others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
     if not len(others):
         return vectors
     nearest = np.flatnonzero(largest)[cKDTree(centres[largest]).query(centres[others])[1]]
+    alike = _relative_angles(vectors[others], vectors[nearest]) < _ALIKE
+    others, nearest = others[alike], nearest[alike]
     started = vectors.copy()
     started[others] = nearest_branch(vectors[others], vectors[nearest])
     return forest.carried(started, nearest_branch)

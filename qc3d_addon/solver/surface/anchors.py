@@ -25,12 +25,14 @@ class ScrewAnchors:
         Positive weights of the vertices in the fit of the screws.
     labels : (n,) int64
         Component of every vertex, 0, 1, 2 and so on.
-    other_way : (p,) int64
-        Components that turn the other way round.
+    turns : (components, 3), optional
+        Rotation vectors of the components' motions, radians. Where they are not finite, and without them, the rotation
+        is the best fit of the positions. That can be half a turn away from how every triangle turns, as where a thin
+        wing bends from one side to the other, and tells nothing about the direction of half a turn.
     """
 
     def __init__(
-        self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints, other_way: Ints | tuple[()] = ()
+        self, key0: Floats, key1: Floats, still: Bools, weights: Floats, labels: Ints, turns: Floats | None = None
     ) -> None:
         self._key0 = key0
         moves = np.bincount(labels) >= 3
@@ -43,9 +45,9 @@ class ScrewAnchors:
         centres = [means_by_label(parts, points, weight) for points in (source, target)]
         spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
         self._turns = best_turns(covariances_by_label(parts, weight[:, None] * spread[1], spread[0]))
-        flipped = np.isin(np.unique(labels[self._members]), other_way)
-        angles = np.maximum(np.linalg.norm(self._turns[flipped], axis=1), 1e-300)[:, None]
-        self._turns[flipped] *= 1.0 - 2.0 * np.pi / angles
+        if turns is not None:
+            told = turns[np.unique(labels[self._members])]
+            self._turns = np.where(np.isfinite(told), told, self._turns)
         rotations = rotation_matrices(self._turns)
         shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
         self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]

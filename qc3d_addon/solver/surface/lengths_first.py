@@ -35,20 +35,26 @@ class LengthsFirst:
         Edges of the mesh.
     labels : (n,) int64
         Component of each vertex.
+    reversal : (components,)
+        How surely each component is mirrored or turned inside out from one key to the other, 0..1: it goes straight,
+        since no motion of its own leads there.
     """
 
-    def __init__(self, key0: Floats, key1: Floats, edges: Ints, labels: Ints) -> None:
+    def __init__(self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats) -> None:
         ends = [_lengths(key, edges) for key in (key0, key1)]
         usable = np.minimum(*ends) > _SHORTEST
         self._edges = edges[usable]
         self._shortest, self._longest = np.minimum(*ends)[usable], np.maximum(*ends)[usable]
+        self._moving = (key0 != key1).any(axis=1)[self._edges].any(axis=1)
         self._labels = labels
         self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
+        self._reversal = reversal
         counts = np.bincount(self._label, minlength=int(labels.max(initial=-1)) + 1)
         # Position of each component's percentile among all edges, sorted by component and excess.
         self._has_edges = np.flatnonzero(counts)
         starts = np.cumsum(counts) - counts
+        self._counts = np.maximum(counts, 1)
         self._places = (starts + np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64))[self._has_edges]
         # Of each component, how far the straight blend may be gone along: not at all where any edge suffers half-way.
         worst = np.zeros(len(counts))
@@ -67,17 +73,30 @@ class LengthsFirst:
         return np.asarray(free + part[self._labels][:, None] * (held - free))
 
     def straightened(self, shape: Floats, time: float) -> Floats:
-        """(n, 3) a shape whose components go straighter where that costs no lengths, and their own way does.
+        """(n, 3) a shape whose components go straighter where their own way costs lengths that the straight one keeps.
 
         Where all edges of a component keep between their key lengths in the straight blend, as those of what is
-        flattened do, it is as good a way as any, and nothing may be worse than it.
+        flattened do, it is as good a way as any. Nor may edges suffer more on average than they do there.
         """
-        if not self._can_go_straight.any():
-            return shape
         straight = (1.0 - time) * self._key0 + time * self._key1
-        need = 1.0 - _allowed(self._excess(shape))
-        part = need * self._can_go_straight
-        return np.asarray(shape + part[self._labels][:, None] * (straight - shape))
+        worse = self._mean_excess(shape) - self._mean_excess(straight)
+        need = np.maximum(1.0 - _allowed(worse), self._reversal)
+        if self._can_go_straight.any():
+            need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * self._can_go_straight)
+        if not need.any():
+            return shape
+        return np.asarray(shape + need[self._labels][:, None] * (straight - shape))
+
+    def lost(self, shape: Floats) -> float:
+        """99th percentile of how far the edges that move leave the interval between their key lengths, relative."""
+        excess = self._excesses(shape)[self._moving]
+        return float(np.percentile(excess, 100.0 * _PERCENTILE)) if len(excess) else 0.0
+
+    def _mean_excess(self, shape: Floats) -> Floats:
+        """(components,) mean over its edges of how far they leave the interval between their key lengths, relative."""
+        return np.asarray(
+            np.bincount(self._label, weights=self._excesses(shape), minlength=len(self._counts)) / self._counts
+        )
 
     def _excess(self, shape: Floats) -> Floats:
         """(components,) 99th percentile of how far edges leave the interval between their key lengths, relative."""

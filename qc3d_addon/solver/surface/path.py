@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
-from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned
+from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned, mean_turns
 from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
@@ -30,6 +30,7 @@ from .end_rates import (
     strain_of_slope,
     stretch_slopes,
 )
+from .joints import Joints
 from .lengths_first import SMALL_CORRECTION, LengthsFirst
 from .rigid_parts import RigidParts
 from .sweeps import Sweeps, Wanted
@@ -127,8 +128,10 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self._group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
-        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels)
-        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, flipped)
+        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, self._closed.reversal(self._key0, key1))
+        turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
+        self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
+        self._joints = Joints(self._key0, key1, ~self._free, weights, labels, turns)
         self._rigid = RigidParts(self._key0, key1, ~self._free, weights, labels)
         area = float(self.deformation.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
@@ -219,9 +222,17 @@ class SurfacePath:
         ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
+    def bends(self, shape: Floats) -> Bools:
+        """(n,) the vertices of components that are congruent in both keys and that a shape (n, 3) would bend."""
+        return np.asarray(self._rigid.bent(shape[self.vertices])[self._group])
+
+    def length_excess(self, shape: Floats) -> float:
+        """How far edges of a shape (n, 3) leave the interval between their key lengths: the 99th percentile of all."""
+        return self._lengths_first.lost(shape[self.vertices])
+
     def _unwelded(self, shape: Floats, time: float) -> Floats:
         """(n, 3) positions of all vertices; coincident ones keep the tiny, interpolated offsets of their keys."""
-        positions = self._rigid.placed(shape, time)[self._group]
+        positions = self._joints.closed(self._rigid.placed(shape, time), time)[self._group]
         if self._apart is not None:
             positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
         return positions

@@ -46,6 +46,7 @@ class RigidParts:
         degree[rests | (size == 0.0)] = 0.0
         self._members = np.flatnonzero(degree[labels] > 0.0)
         self._degree = degree[labels[self._members], None]
+        self._sizes = size
         self._missed = missed[self._members]
 
     def placed(self, shape: Floats, time: float) -> Floats:
@@ -55,6 +56,17 @@ class RigidParts:
         own, result = self._members, shape.copy()
         rigid = self._placed(self._key0, shape)[own] + time * self._missed
         result[own] += self._degree * (rigid - shape[own])
+        return result
+
+    def bent(self, shape: Floats) -> Bools:
+        """(n,) the vertices of congruent components that a shape (n, 3) bends by more than congruent ones differ."""
+        result = np.zeros(len(shape), dtype=bool)
+        own = self._members
+        if len(own):
+            labels = self._labels[own]
+            missed = np.zeros(len(self._sizes))
+            np.maximum.at(missed, labels, np.linalg.norm(self._placed(self._key0, shape)[own] - shape[own], axis=1))
+            result[own] = missed[labels] > _CONGRUENT * self._sizes[labels]
         return result
 
     def _placed(self, source: Floats, target: Floats) -> Floats:

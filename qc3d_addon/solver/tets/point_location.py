@@ -46,6 +46,14 @@ def locate(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats]:
     References
     ----------
     Devillers, Pion & Teillaud, "Walking in a triangulation", 2002.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from qc3d_addon.solver.tets.kuhn_grid import kuhn_grid
+    >>> tets, weights = locate(kuhn_grid(1), np.array([[0.5, 0.5, 0.5]]))
+    >>> bool(abs(weights.sum() - 1.0) < 1e-12)
+    True
     """
     points = np.asarray(points, dtype=np.float64)
     lowest, highest = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -81,6 +89,14 @@ def interpolation_matrix(mesh: TetMesh, points: Floats) -> csr_array:
     ------
     MeshingError
         If a point is not finite or lies outside the mesh.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from qc3d_addon.solver.tets.kuhn_grid import kuhn_grid
+    >>> grid = kuhn_grid(2)
+    >>> interpolation_matrix(grid, np.array([[0.3, 0.4, 0.1]])) @ grid.points
+    array([[0.3, 0.4, 0.1]])
     """
     tets, weights = locate(mesh, points)
     starts = np.arange(0, 4 * len(tets) + 1, 4)

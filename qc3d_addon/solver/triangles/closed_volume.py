@@ -8,7 +8,12 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..numerics.grouped_sums import sums_by_label
+from .geometry import areas
 from .topology import closed_faces
+
+# A part that is turned inside out still encloses, relative to its area, at least this fraction of its former volume. A
+# part that crosses itself all over or is flattened encloses almost none, and the sign of its volume means nothing.
+AS_FULL = 0.3
 
 
 class ClosedComponents:
@@ -45,6 +50,27 @@ class ClosedComponents:
     def volumes(self, positions: Floats) -> Floats:
         """(components,) signed enclosed volumes for positions (n, 3), in cubed units; 0 for open components."""
         return volumes_seen_from(positions[self._views], positions, self.faces, self.labels)
+
+
+    def fullness(self, positions: Floats) -> Floats:
+        """(components,) signed volumes for positions (n, 3) over the areas to the power of 3/2; 0 for open components.
+
+        They do not depend on the size; a sphere has 0.094.
+        """
+        volumes = self.volumes(positions)
+        surface = sums_by_label(self.labels[self.faces[:, 0]], areas(positions, self.faces), len(volumes))
+        return np.asarray(volumes / np.maximum(surface, 1e-100) ** 1.5)
+
+    def reversal(self, key0: Floats, key1: Floats) -> Floats:
+        """(components,) how surely each is mirrored or turned inside out between keys (n, 3), from 0 (no) to 1 (yes).
+
+        It is 1 where the volume changes its sign and neither key is much flatter than the other.
+        """
+        full = np.stack([self.fullness(key) for key in (key0, key1)])
+        least, most = np.abs(full).min(axis=0), np.abs(full).max(axis=0)
+        share = np.where(full[0] * full[1] < 0.0, least / np.maximum(most, 1e-300), 0.0)
+        part = np.minimum(share / AS_FULL, 1.0)
+        return np.asarray(part * part * (3.0 - 2.0 * part))
 
 
 def volumes_seen_from(views: Floats, positions: Floats, faces: Ints, labels: Ints) -> Floats:

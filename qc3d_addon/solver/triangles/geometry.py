@@ -21,7 +21,15 @@ def cross_product(first: Floats, second: Floats) -> Floats:
 
 
 def face_normals(positions: Floats, faces: Ints) -> Floats:
-    """(m, 3) normals of triangles (m, 3); the length of each is twice the triangle's area."""
+    """(m, 3) normals of triangles (m, 3); the length of each is twice the triangle's area.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> face_normals(corners, np.array([[0, 1, 2]]))
+    array([[0., 0., 1.]])
+    """
     first, second, third = (positions[faces[:, corner]] for corner in range(3))
     return np.asarray(np.cross(second - first, third - first))
 
@@ -62,7 +70,15 @@ def planar_jacobians(positions: Floats, faces: Ints, bases: Floats, gradients: F
 
 
 def areas(positions: Floats, faces: Ints) -> Floats:
-    """(m,) areas of triangles (m, 3) with vertices at positions (n, 3), in squared units."""
+    """(m,) areas of triangles (m, 3) with vertices at positions (n, 3), in squared units.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    >>> areas(corners, np.array([[0, 1, 2]]))
+    array([0.5])
+    """
     return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
 
 
@@ -71,6 +87,13 @@ def vertex_areas(points: Floats, faces: Ints, shares: Floats | float = 1.0) -> F
 
     What the triangles count is multiplied by ``shares`` (m,).
     At least a thousandth of the mean, so that every vertex has a positive weight; all 1 for a mesh without area.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    >>> vertex_areas(corners, np.array([[0, 1, 2]]))
+    array([1., 1., 1.])
     """
     shares = sums_by_label(faces.ravel(), np.repeat(areas(points, faces) * shares / 3.0, 3), len(points))
     mean = float(shares.mean())

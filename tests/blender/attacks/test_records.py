@@ -109,7 +109,7 @@ def expect_sound(record: Record) -> None:
             assert 1 <= len(name.encode()) <= 2 * names.LIMIT
             assert "\0" not in name
         if chain.keyframes is not None:
-            assert chain.keyframes[0] < chain.keyframes[1]
+            assert list(chain.keyframes) == sorted(set(chain.keyframes))
         if chain.result is not None:
             assert chain.result.seconds < float("inf")
             assert chain.result.worst is None or 0.0 <= chain.result.worst.at <= 1.0
@@ -156,7 +156,7 @@ def test_every_value_of_a_record(baked: bpy.types.Object) -> None:
                 counts["refused"] += 1
     assert counts["refused"] > 900, counts
     # What a later bake may not know (its request) and what no bake can tell (a name, a count) is read.
-    assert 50 < counts["read"] < 450, counts
+    assert 50 < counts["read"] < 500, counts
 
 
 def test_values_that_are_missing_too_many_or_of_other_types(baked: bpy.types.Object) -> None:

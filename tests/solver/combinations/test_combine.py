@@ -177,3 +177,14 @@ def test_a_mouth_opens_smiling_without_new_crossings(data_folder: Path) -> None:
     known = {tuple(pair) for shape in (rest, jaw, smile) for pair in search.pairs(shape).tolist()}
     assert len({tuple(pair) for pair in search.pairs(composed).tolist()} - known) > 100  # what had to be undone
     assert not {tuple(pair) for pair in search.pairs(found.shape).tolist()} - known
+
+
+def test_width_and_height_of_a_box_multiply() -> None:
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    both = corners * [2.0, 1.0, 1.5]
+    found = qc3d.combine(corners, [corners * [2.0, 1.0, 1.0], corners * [1.0, 1.0, 1.5]], faces)
+    assert abs(found.shape - both).max() < 1e-9
+    [verdict] = qc3d.judge_pairs(corners, [corners * [2.0, 1.0, 1.0], corners * [1.0, 1.0, 1.5]], faces)
+    assert verdict.adding_is_right

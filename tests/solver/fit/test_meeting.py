@@ -104,7 +104,7 @@ def test_by_the_api() -> None:
 
 
 def test_vertices_that_cannot_be_met_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meeting, "_ITERATIONS", (2, 2, 2, 2))
+    monkeypatch.setattr(meeting, "_ITERATIONS", 2)
     points, faces = icosphere(1, 1.0)
     middle = points.mean(axis=0)
     pushed = points.copy()

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ from qc3d_addon.solver.frames.weights import Weights
 from qc3d_addon.solver.settings import Easing, FrameOptions, Mode, PlayOptions, WeightKind
 from qc3d_addon.solver.support.progress import finish
 
-from ..meshes import arced, box_surface
+from ..meshes import arced, box_surface, twisted
 
 pytestmark = pytest.mark.usefixtures("coarse_volume")
 BAR, FACES = box_surface((2, 2, 12), (1.0, 1.0, 5.0))
@@ -123,6 +125,46 @@ def test_a_chain_in_mode_straight_turns_its_corner() -> None:
     assert found.report.played.distance < 1e-15
 
 
+class TestMore:
+    """A bar that twists loses its volume between a few in-betweens."""
+
+    TWISTED = twisted(BAR, np.radians(270.0))
+
+    def found(self, play: PlayOptions, through: str = "ab") -> Bake:
+        shapes = {"a": BAR, "b": self.TWISTED, "c": arced(BAR, 0.1)}
+        task = Task.of_keys(shapes, FACES, None, tuple(through))
+        found = finish(carry_out(replace(task, play=play))).bake
+        assert found is not None
+        return found
+
+    @pytest.mark.parametrize("weights", ["smooth", "hats"])
+    def test_more_in_betweens_where_volumes_ask_for_them(self, weights: WeightKind) -> None:
+        few = self.found(PlayOptions(count=3, weights=weights))
+        more = self.found(PlayOptions(count=3, weights=weights, more=True))
+        assert few.report.played is not None
+        assert more.report.played is not None
+        assert few.report.played.volume > 0.004
+        assert more.report.played.volume < 0.5 * few.report.played.volume
+        assert len(few.times) == 5 < len(more.times) <= 9
+        np.testing.assert_array_equal(more.frames[-1], self.TWISTED)
+
+    def test_no_more_than_needed(self) -> None:
+        play = PlayOptions(count=5, more=True)
+        np.testing.assert_allclose(bake(play).times, np.linspace(0.0, 1.0, 7))
+
+    def test_only_between_the_keys_that_need_them_and_beside_places_of_ones_own(self) -> None:
+        found = self.found(PlayOptions(count=3, more=True, also_at=(0.9,)), through="bac")
+        before, after = found.times[found.times < 0.5], found.times[found.times > 0.5]
+        assert len(before) > 4
+        np.testing.assert_allclose(after, [0.625, 0.75, 0.875, 0.9, 1.0])
+
+    def test_one_more_stands_half_way_between_the_others(self) -> None:
+        moments = Moments.of(PlayOptions(count=2), FrameOptions(), 1)
+        assert moments.denser(PlayOptions(count=2), [0]).tolist() == [0, 2, 4, 6]
+        assert moments.denser(PlayOptions(count=2), [1]).tolist() == [0, 1, 3, 5, 6]
+        assert moments.denser(PlayOptions(count=2), [2]).tolist() == [0, 1, 2, 3, 4, 5, 6]
+
+
 @pytest.mark.parametrize(
     ("choice", "sentence"),
     [
@@ -133,6 +175,7 @@ def test_a_chain_in_mode_straight_turns_its_corner() -> None:
         ({"weights": "cubic"}, "Unknown weights 'cubic'"),
         ({"also_at": (0.5, 1.0)}, "between 0 and 1"),
         ({"also_at": ("a",)}, "place of an in-between is 'a'"),
+        ({"more": 1}, "option more is 1"),
     ],
 )
 def test_options_are_checked(choice: dict[str, object], sentence: str) -> None:

@@ -14,16 +14,21 @@ from scipy.interpolate import CubicSpline
 
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.frames.easing import eased
+from qc3d_addon.solver.frames.key_times import KeyTimes
 from qc3d_addon.solver.frames.preview import PreviewCurve
 from qc3d_addon.solver.frames.weights import Weights
-from qc3d_addon.solver.settings import Easing
+from qc3d_addon.solver.settings import Easing, FrameOptions
 
 RANDOM = np.random.default_rng(0)
 
 
+def even(pairs: int, easing: Easing = "linear") -> KeyTimes:
+    return KeyTimes.of(FrameOptions(easing=easing), pairs)
+
+
 def test_the_frames_themselves() -> None:
     frames = RANDOM.normal(size=(13, 7, 3))
-    curve = PreviewCurve(frames, pairs=3)
+    curve = PreviewCurve(frames, even(3))
     for number, frame in enumerate(frames):
         np.testing.assert_array_equal(curve.at(number / 12), frame.astype(np.float32))
     np.testing.assert_array_equal(curve.at(-1.0), frames[0].astype(np.float32))
@@ -42,7 +47,7 @@ def test_every_pair_has_its_own_spline() -> None:
     times = np.linspace(0.0, 2.0, 13)
     # Cubic on either side of the key in the middle, where it turns a corner.
     frames = np.where(times < 1.0, times**3, (2.0 - times) ** 3)[:, None, None] * np.ones((1, 2, 3))
-    curve = PreviewCurve(frames, pairs=2)
+    curve = PreviewCurve(frames, even(2))
     for time in (0.31, 0.49, 0.51, 0.83):
         along = 2.0 * time
         expected = along**3 if along < 1.0 else (2.0 - along) ** 3
@@ -65,9 +70,16 @@ def test_an_arc_is_met_to_the_fourth_order(steps: int) -> None:
 def test_easing_is_when_and_not_where(easing: Easing) -> None:
     frames = RANDOM.normal(size=(13, 7, 3))
     times = np.linspace(0.0, 1.0, 31)
-    curve, eased_curve = PreviewCurve(frames, 2), PreviewCurve(frames, 2, easing)
+    curve, eased_curve = PreviewCurve(frames, even(2)), PreviewCurve(frames, even(2, easing))
     for time, passed in zip(times, eased(times, easing), strict=True):
         np.testing.assert_array_equal(eased_curve.at(time), curve.at(passed))
+
+
+def test_keys_at_times_of_their_own() -> None:
+    frames = RANDOM.normal(size=(13, 7, 3))
+    curve = PreviewCurve(frames, KeyTimes.of(FrameOptions(via_at=(0.2, 0.5)), 3))
+    for time, number in ((0.0, 0), (0.1, 2), (0.2, 4), (0.35, 6), (0.5, 8), (0.75, 10), (1.0, 12)):
+        np.testing.assert_allclose(curve.at(time), frames[number], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", [Weights.hats, Weights.smooth])

@@ -50,13 +50,13 @@ def test_as_many_are_kept_as_the_probabilities_say() -> None:
 
 
 def test_it_fills_the_cube() -> None:
-    points, faces = icosphere(2)
+    points, faces = icosphere(1)
     dense, sparse = (
-        fill_cube(points, faces, FitOptions(sampling="published", sparsity=sparsity)).mesh for sparsity in (4.0, 30.0)
+        fill_cube(points, faces, FitOptions(sampling="published", sparsity=sparsity)).mesh for sparsity in (10.0, 30.0)
     )
     assert len(sparse.points) < 0.7 * len(dense.points)
     assert smallest_dihedral_angles(dense).min() > 4.0
-    same = fill_cube(points, faces, FitOptions(sampling="published", sparsity=4.0)).mesh
+    same = fill_cube(points, faces, FitOptions(sampling="published", sparsity=10.0)).mesh
     np.testing.assert_array_equal(dense.points, same.points)
 
 

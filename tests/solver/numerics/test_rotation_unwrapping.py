@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
-from qc3d_addon.solver.numerics.rotation_unwrapping import Turning, consistent_turning, swing_beside
+from qc3d_addon.solver.numerics.rotation_unwrapping import Turning, consistent_turning, mean_turns, swing_beside
 from qc3d_addon.solver.numerics.rotations import rotation_matrices, rotation_vectors
 from qc3d_addon.solver.triangles.deformation import TriangleDeformation
 from qc3d_addon.solver.triangles.topology import face_adjacency
@@ -70,6 +70,11 @@ class TestKnownTurns:
         sleeve = np.linspace(0.0, np.radians(230.0), 12)[:, None] * np.array([0.0, 1.0, 0.0])
         button = np.broadcast_to(np.radians(228.0) * np.array([0.0, 1.0, 0.0]), (2, 3))
         assert_recovered(np.concatenate([sleeve, button]), np.concatenate([chain(12), [[12, 13]]]))
+
+    def test_wings_beat_each_its_own_way(self) -> None:
+        # From the tip to the body, where the other one begins.
+        wing = np.radians(np.linspace(185.0, 125.0, 8))[:, None] * np.array([0.0, 0.0, 1.0])
+        assert_recovered(np.concatenate([wing, -wing[:1:-1]]), np.concatenate([chain(8), 8 + chain(6)]))
 
     def test_parts_have_their_own_axes(self) -> None:
         along = np.linspace(0.0, 5.0, 12)[:, None]
@@ -144,3 +149,11 @@ class TestTriangles:
         halfway = self.halfway(bent(BAR, np.radians(degrees)))
         between = rotation_vectors(halfway @ rotation_matrices(-0.5 * turns))
         np.testing.assert_allclose(np.linalg.norm(between, axis=1), 0.0, rtol=0.0, atol=0.1)
+
+
+def test_mean_turns_of_parts_and_of_none() -> None:
+    swing, twist = np.diag([1.0, 3.0, 5.0])[[0, 0, 2]], np.diag([0.0, 0.0, 2.0])
+    turning = Turning(swing * [[1.0], [3.0], [1.0]], twist)
+    means = mean_turns(turning, np.array([3.0, 1.0, 1.0]), np.array([0, 0, 2]), 3)
+    np.testing.assert_allclose(means[[0, 2]], [[1.5, 0.0, 0.0], [0.0, 0.0, 7.0]])
+    assert np.isnan(means[1]).all()

@@ -69,6 +69,20 @@ def test_what_has_no_screw_goes_straight() -> None:
         np.testing.assert_allclose(anchors.positions(time), key0 + time * (key1 - key0), rtol=0.0, atol=1e-15)
 
 
+def test_turns_that_are_told_and_others() -> None:
+    random = np.random.default_rng(4)
+    key0 = random.normal(size=(12, 3))
+    labels = np.repeat([0, 1], 6)
+    way = np.radians([[0.0, 0.0, 200.0]])
+    key1 = key0 @ rotation_matrices(way)[0].T
+    mask, weights = np.zeros(12, dtype=bool), np.ones(12)
+    turns = np.concatenate([way, np.full((1, 3), np.nan)])
+    middle = ScrewAnchors(key0, key1, mask, weights, labels, turns).positions(0.5)
+    for part, angle in ((slice(0, 6), 100.0), (slice(6, 12), -80.0)):
+        expected = key0[part] @ rotation_matrices(np.radians([[0.0, 0.0, angle]]))[0].T
+        np.testing.assert_allclose(middle[part], expected, atol=1e-9)
+
+
 def test_nothing_at_all() -> None:
     key = np.random.default_rng(0).normal(size=(6, 3))
     anchors = anchors_of(key, key, np.zeros(6, dtype=np.int64), still=list(range(6)))

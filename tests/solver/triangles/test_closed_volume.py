@@ -54,6 +54,15 @@ class TestVolumes:
         exact = enclosed_volume(points - points[0], BALL_FACES)
         assert components_of(points, BALL_FACES).volumes(points) == pytest.approx([exact], rel=1e-12)
 
+    def test_reversal_by_degrees(self) -> None:
+        components = components_of(BOX, BOX_FACES)
+        for scale, expected in ((1.0, 0.0), (0.0, 0.0), (-1.0, 1.0), (-0.5, 1.0)):
+            assert components.reversal(BOX, BOX * [1.0, 1.0, scale]) == pytest.approx([expected])
+        flat = [float(components.reversal(BOX, BOX * [1.0, 1.0, scale])[0]) for scale in np.linspace(0.0, -0.5, 2000)]
+        assert np.all(np.diff(flat) >= 0.0)
+        assert max(np.diff(flat)) < 0.05
+        assert components.reversal(BOX, -3.0 * BOX) == pytest.approx([1.0])  # whatever the size
+
     def test_each_component_its_own(self) -> None:
         points, faces = joined((BOX, BOX_FACES), (0.1 * BOX + [0, 0, 1], BOX_FACES), (BALL + 7.0, BALL_FACES))
         found = components_of(points, faces).volumes(points)

@@ -100,7 +100,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def _run(arguments: argparse.Namespace) -> None:
     try:
         from ..blender.bake.run import bake_file, bake_object, bake_object_keys, bake_objects_together
-        from ..blender.combinations.combine import combine, finished
+        from ..blender.combinations.combine import combine
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
     ways = [bool(arguments.on_keys), arguments.all_keys, any((arguments.first, arguments.last, arguments.via))]
@@ -118,7 +118,7 @@ def _run(arguments: argparse.Namespace) -> None:
             return list(result.notes), result.report
 
         def bake_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
-            verdicts = bake_object_keys(obj, arguments.on_keys, request, bars)
+            verdicts = bake_object_keys(obj, arguments.on_keys, request, bars.of_keys)
             if all(verdict.ended == "failed" for verdict in verdicts):
                 raise InputError(" ".join(map(str, verdicts)))
             values = [{"key": one.key, "ended": one.ended, "text": one.text, "report": one.report} for one in verdicts]
@@ -127,7 +127,7 @@ def _run(arguments: argparse.Namespace) -> None:
         def combine_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
             said, values = (bake_pair if ways[2] else bake_keys)(obj) if any(ways) else ([], {})
             for names in arguments.combine:
-                made = finished(combine(obj, names, options=fit_options(arguments)))
+                made = combine(obj, names, options=fit_options(arguments), on_progress=bars)
                 said.append(f"{obj.name}: {made.text}")
                 values = {**values, "combinations": [*values.get("combinations", []), asdict(made)]}
             return said, values

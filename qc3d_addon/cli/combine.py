@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 from ..solver.combinations.base import KeysOnBase
-from ..solver.combinations.combine import combine
+from ..solver.combinations.mirrored import combine_halves
 from ..solver.combinations.verdicts import verdicts
 from ..solver.errors import InputError
 from ..solver.files.atomic import replacing_all, require_writable
@@ -17,7 +17,7 @@ from ..solver.keys.files import read_shapes
 from ..solver.settings import FitOptions
 from ..solver.support.progress import finish
 from . import speech
-from .options import add_options, fit_options, print_notes
+from .options import add_mirror, add_options, fit_options, print_notes
 from .progress_bars import StageBars
 
 
@@ -40,6 +40,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--weights", type=float, nargs="+", metavar="W", help="weight of each key, 0 to 1, in that order (default: 1)"
     )
     command.add_argument("--find-order", action="store_true", help="find the order of the keys instead, and print it")
+    add_mirror(command)
     command.add_argument("--output", type=Path, required=True, metavar="OUT.npz", help="faces (m, 3), shape (n, 3)")
     add_options(command, FitOptions)
     command.set_defaults(run=_run)
@@ -56,7 +57,7 @@ def _run(arguments: argparse.Namespace) -> None:
     keys = KeysOnBase(shapes[arguments.rest], [shapes[name] for name in names], faces)
     order = None if arguments.find_order else range(len(names))
     with StageBars() as bars:
-        made = finish(combine(keys, arguments.weights, order, options), bars)
+        made = finish(combine_halves(keys, arguments.mirror, arguments.weights, order, options), bars)
     with replacing_all(arguments.output) as (output,):
         write_arrays(output, {"faces": keys.pairs[0].faces, "shape": made.shape})
     if arguments.find_order:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import get_args
 
 from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.frames.files import write_frames
@@ -15,10 +14,11 @@ from ..solver.frames.modes import needs_fits
 from ..solver.frames.remade import Settings
 from ..solver.frames.task import Task, carry_out
 from ..solver.keys.files import read_pairs
-from ..solver.settings import FitOptions, FrameOptions, Mirror
+from ..solver.settings import FitOptions, FrameOptions
 from ..solver.support.progress import finish
 from .options import (
     add_keys,
+    add_mirror,
     add_options,
     fit_options,
     frame_options,
@@ -40,13 +40,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3), polygons (m,) where known",
     )
     add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1, settings")
-    command.add_argument(
-        "--mirror",
-        choices=get_args(Mirror),
-        default="auto",
-        help="axes to mirror across, if the mesh is only one half; auto: those where it is open on a plane through the "
-        "origin (default: auto)",
-    )
+    add_mirror(command)
     add_options(command, FrameOptions, FitOptions)
     command.set_defaults(run=_run)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from ..solver.errors import on_one_line
-from ..solver.settings import FitOptions, FrameOptions, PlayOptions
+from ..solver.settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from . import speech
 
 MOST_FRAMES = 10_000
@@ -30,6 +30,17 @@ _HELP = {
 }
 _NUMBERS = ("threshold", "sparsity")
 _METAVARS = {"extra_turns": "TURNS", "seed": "S"}
+
+
+def add_mirror(command: argparse.ArgumentParser) -> None:
+    """Add the option --mirror."""
+    command.add_argument(
+        "--mirror",
+        choices=get_args(Mirror),
+        default="auto",
+        help="axes to mirror across, if the mesh is only one half; auto: those where it is open on a plane through the "
+        "origin (default: auto)",
+    )
 
 
 def add_options(command: argparse.ArgumentParser, *kinds: type[FitOptions | FrameOptions | PlayOptions]) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from tqdm import tqdm
 
-    from ..solver.support.progress import Progress
+    from ..solver.support.progress import Done, Progress
 
 _FORMAT = "{desc:8}{percentage:4.0f}% |{bar:40}| {elapsed}"
 
@@ -29,12 +29,19 @@ class StageBars:
         self._visible = sys.stderr is not None and sys.stderr.isatty() and find_spec("tqdm") is not None
 
     def __call__(self, progress: Progress) -> None:
+        self._show(progress.stage, progress.fraction)
+
+    def of_keys(self, progress: Done) -> None:
+        """Draw the progress of a run of many keys: one bar for all."""
+        self._show("keys", progress.overall)
+
+    def _show(self, stage: str, fraction: float) -> None:
         if not self._visible:
             return
-        if self._bar is None or self._bar.desc != progress.stage:
+        if self._bar is None or self._bar.desc != stage:
             self._finish_stage()
-            self._bar = _new_bar(progress.stage)
-        self._bar.update(max(0.0, progress.fraction - self._bar.n))
+            self._bar = _new_bar(stage)
+        self._bar.update(max(0.0, fraction - self._bar.n))
 
     def __enter__(self) -> StageBars:
         return self

@@ -26,9 +26,10 @@ from .frames.bake import Bake
 from .frames.chain import chain_frames
 from .frames.following import Following
 from .frames.modes import needs_fits
+from .frames.task import Outcome
 from .maps.mapping import Mapping
 from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
-from .support.progress import Progress, Steps, finish
+from .support.progress import Done, Progress, Steps, finish
 
 __all__ = [
     "Collider",
@@ -40,6 +41,7 @@ __all__ = [
     "QC3DError",
     "Verdict",
     "bake",
+    "bake_keys",
     "bake_together",
     "combine",
     "fit",
@@ -277,6 +279,71 @@ def bake(
     return work.run(progress)
 
 
+def bake_keys(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    frames: int | ArrayLike = 5,
+    edges: ArrayLike | None = None,
+    *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    progress: Callable[[Done], object] | None = None,
+    **options: Unpack[FitChoices],
+) -> Iterator[tuple[int, Bake | QC3DError]]:
+    """Bake many keys of one base in one run: what they have in common is made once, and they run on all cores.
+
+    Parameters
+    ----------
+    base : (n, 3)
+        The shape that the keys are relative to.
+    keys : sequence of (n, 3)
+    faces, frames, edges, polygons, mirror, mode, easing, **options
+        See ``bake``; ``frames`` is for each key.
+    progress : callable
+        Called with a ``Done`` now and then: how many keys have ended, and the finished share ``overall``, 0..1.
+
+    Yields
+    ------
+    (int, Bake or QC3DError)
+        The index of a key and its frames, from the base to the key, as soon as they are there; or, for a key that
+        cannot be baked, the error that says why. The others go on. Leaving the loop stops the work.
+
+    Raises
+    ------
+    InputError
+        If an option or the number of frames cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np, qc3d_addon as qc3d
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> bakes = dict(qc3d.bake_keys(corners, [1.1 * corners, corners[:2]], faces, frames=1))
+    >>> bakes[0].frames.shape
+    (3, 4, 3)
+    >>> str(bakes[1])
+    'The keys have 4 and 2 vertices; both must be shapes of the same mesh.'
+    """
+    run, failed = steps.run_of_keys(
+        base, keys, faces, frames, edges, polygons=polygons, mirror=mirror, mode=mode, easing=easing, **options
+    )
+    yield from failed.items()
+    numbers = [number for number in range(len(keys)) if number not in failed]
+    for step in run.carried_out():
+        if isinstance(step, Done):
+            if progress is not None:
+                progress(step)
+        elif isinstance(step.outcome, QC3DError):
+            yield numbers[step.number], step.outcome
+        else:
+            assert isinstance(step.outcome, Outcome)
+            assert step.outcome.bake is not None
+            yield numbers[step.number], step.outcome.bake
+
+
 def combine(
     base: ArrayLike,
     keys: Sequence[ArrayLike],
@@ -285,6 +352,7 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    mirror: Mirror = "auto",
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
 ) -> Combination:
@@ -303,6 +371,8 @@ def combine(
     order : sequence of int, optional
         Indices of the keys, outermost first: the motion of a key happens inside those before it. By default, the outer
         of two keys is the one that turns more where the other bends.
+    mirror : Mirror
+        See ``fit``: of a half mesh, the mirrored whole is combined, and its seam stays on the plane.
     progress : callable
         Called with a ``Progress`` now and then. What it raises stops the work and is passed on.
     **options
@@ -323,7 +393,8 @@ def combine(
     >>> qc3d.combine(corners, [turned, longer], faces).shape[1].round(6) + 0.0  # the sum has (1, 1, 0)
     array([0., 2., 0.])
     """
-    return steps.combine(base, keys, faces, edges, weights=weights, order=order, **options).run(progress)
+    work = steps.combine(base, keys, faces, edges, weights=weights, order=order, mirror=mirror, **options)
+    return work.run(progress)
 
 
 def judge_pairs(

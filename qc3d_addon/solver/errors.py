@@ -44,6 +44,10 @@ class MeshingError(QC3DError):
     """The cube could not be filled with tetrahedra."""
 
 
+class CanceledError(QC3DError):
+    """The user stopped the work before it came to this."""
+
+
 class WorkerError(QC3DError):
     """The background process ended without a result."""
 

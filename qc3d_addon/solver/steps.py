@@ -20,21 +20,23 @@ from numpy.typing import ArrayLike
 
 from .arrays import Floats
 from .collision.colliders import Collider
-from .combinations import combine as combining
+from .combinations import mirrored
 from .combinations.base import KeysOnBase
 from .combinations.combine import Combination
-from .errors import InputError
+from .errors import InputError, QC3DError
 from .fit import fit_pair as fitting
 from .fit.fitted_map import FittedMap
 from .frames import task as tasks
 from .frames.bake import Bake
 from .frames.key_times import KeyTimes
+from .frames.many import Run
 from .frames.task import Outcome, Task
 from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
 from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
 from .support.progress import Progress, Steps, finish
+from .triangles.polygons import flat_quads
 
 T = TypeVar("T")
 
@@ -125,6 +127,47 @@ def bake(
     return Work(_bake_of(tasks.carry_out(task)))
 
 
+def run_of_keys(
+    base: ArrayLike,
+    keys: Sequence[ArrayLike],
+    faces: ArrayLike,
+    frames: int | ArrayLike = 5,
+    edges: ArrayLike | None = None,
+    *,
+    polygons: ArrayLike | None = None,
+    mirror: Mirror = "auto",
+    mode: Mode = "natural",
+    easing: Easing = "linear",
+    **options: Unpack[FitChoices],
+) -> tuple[Run, dict[int, QC3DError]]:
+    """The run of many keys of one base, see :func:`.api.bake_keys`, and why keys are not in it, by their numbers."""
+    ends = ("base", "key")
+    frame_options = FrameOptions(mode, easing)
+    choices = FitOptions(**options), frame_options, times_of(frames, 1, frame_options)
+    usable: dict[int, KeyPair] = {}
+    failed: dict[int, QC3DError] = {}
+    for number, key in enumerate(keys):
+        try:
+            shapes = dict(zip(ends, (base, key), strict=True))
+            usable[number] = consecutive_pairs(shapes, faces, edges, ends, polygons)[ends]
+        except QC3DError as error:
+            failed[number] = error
+    tasks = {}
+    for number, pair in usable.items():
+        # Quads that are flat in all keys, so that all have the same covering and can share a volume.
+        every = [pair.key0, *(other.key1 for other in usable.values())]
+        if polygons is None:
+            polygons = flat_quads(every, pair.faces)
+        try:
+            shapes = dict(zip(ends, (pair.key0, pair.key1), strict=True))
+            task = Task.of_keys(shapes, faces, edges, ends, *choices, None, polygons, mirror)
+            task.require_memory(machine_limit_mb())
+            tasks[number] = task
+        except QC3DError as error:
+            failed[number] = error
+    return Run.of(list(tasks.values()), machine_limit_mb()), failed
+
+
 def combine(
     base: ArrayLike,
     keys: Sequence[ArrayLike],
@@ -133,10 +176,12 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    mirror: Mirror = "auto",
     **options: Unpack[FitChoices],
 ) -> Work[Combination]:
     """The combination of several keys, step by step; see :func:`.api.combine` for the parameters."""
-    return Work(combining.combine(KeysOnBase(base, keys, faces, edges), weights, order, FitOptions(**options)))
+    given = KeysOnBase(base, keys, faces, edges)
+    return Work(mirrored.combine_halves(given, mirror, weights, order, FitOptions(**options)))
 
 
 def bake_together(

@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
-import json
 import os
-import signal
+import queue
 import subprocess
 import sys
 import threading
@@ -16,18 +14,30 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Generic, TypeVar, cast, overload
 
 from ..solver import errors
-from ..solver.errors import InputError, QC3DError, WorkerError, with_remedy
+from ..solver.combinations.corrections import Corrected, Corrections
+from ..solver.errors import QC3DError, WorkerError, with_remedy
 from ..solver.files.private_folders import PrivateFolder, temporary_place
+from ..solver.frames.many import Run
 from ..solver.frames.task import Outcome, Task
 from ..solver.support.child_python import interpreter
-from ..solver.support.progress import STAGES, Progress
-from .exchange import read_outcome, write_task
+from ..solver.support.progress import Done, Progress
+from . import messages
+from .exchange import (
+    folder_of,
+    read_corrected,
+    read_outcome,
+    write_corrections,
+    write_run,
+    write_task,
+)
 from .idleness import LONGEST_IDLE, Idleness
+from .messages import Ending
+from .processes import how_it_ended, kill, library_folders
 
 CHILD = Path(__file__).with_name("task_child.py")
-_LIBRARIES = ("scipy", "pytetwild", "numpy")  # numpy last: its folder may contain another scipy than the bundled one
 _POLL_SECONDS = 0.05  # short beside any work, and long enough to take no processor time
 _LONGEST_MESSAGE = 1_000_000  # bytes; more without an end is not a message of ours
 
@@ -39,7 +49,7 @@ class Limits:
     Parameters
     ----------
     seconds : float
-        Time after which it is stopped.
+        Time after which it is stopped, for each task.
     memory_mb : int
         Megabytes that it may allocate; 0 for no limit. Enforced on Linux only.
     """
@@ -48,29 +58,44 @@ class Limits:
     memory_mb: int = 0
 
 
-class Worker:
-    """A task that runs in a child process. Use it from one thread only, and always call ``close`` at the end.
+Outcomes = list[Outcome | QC3DError]
+Job = Task | Run | Corrections
+Result = TypeVar("Result", Outcome, Outcomes, Corrected)
+
+
+class Worker(Generic[Result]):
+    """A task, a run or corrections in a child process. Use it from one thread, and call ``close`` at the end.
 
     Parameters
     ----------
-    task : Task
-        What to compute.
+    job : Task, Run or Corrections
+        What to compute. The result of a task is its outcome; that of a run the outcome of each of its tasks, or why it
+        has none; that of corrections the corrected shapes.
     limits : Limits, optional
 
     Raises
     ------
     InputError
-        If the task needs more memory than its limit.
+        If the job needs more memory than its limit.
     WorkerError
         If the child process cannot be started.
     """
 
-    def __init__(self, task: Task, limits: Limits | None = None) -> None:
-        self._task = task
+    @overload
+    def __init__(self: Worker[Outcome], job: Task, limits: Limits | None = None) -> None: ...
+    @overload
+    def __init__(self: Worker[Outcomes], job: Run, limits: Limits | None = None) -> None: ...
+    @overload
+    def __init__(self: Worker[Corrected], job: Corrections, limits: Limits | None = None) -> None: ...
+
+    def __init__(self, job: Job, limits: Limits | None = None) -> None:
+        self._job = job
         self._limits = limits or Limits()
-        task.require_memory(self._limits.memory_mb)
-        self._progress: Progress | None = None
-        self._ending: list[str] | None = None  # empty after success, else the type of the error and its message
+        job.require_memory(self._limits.memory_mb)
+        self._progress: Progress | Done | None = None
+        self._ending: Ending | None = None
+        self._ended_tasks: queue.SimpleQueue[Ending] = queue.SimpleQueue()
+        self._arrived: dict[int, Outcome | QC3DError] = {}
         self._is_garbled = False
         self._is_closed = False
         try:
@@ -79,7 +104,12 @@ class Worker:
             raise _not_started(error) from error
         self._errors = self._folder.path / "errors.txt"
         try:
-            write_task(self._folder.path, task)
+            if isinstance(job, Run):
+                write_run(self._folder.path, job)
+            elif isinstance(job, Corrections):
+                write_corrections(self._folder.path, job)
+            else:
+                write_task(self._folder.path, job)
             self._process = self._start()
         except OSError as error:
             self._folder.close()
@@ -88,24 +118,42 @@ class Worker:
             self._folder.close()
             raise
         self._idleness = Idleness(self._process.pid)
-        self._deadline = clock.monotonic() + self._limits.seconds
+        self._seconds = self._limits.seconds * (max(len(job.tasks), 1) if isinstance(job, Run) else 1)
+        self._deadline = clock.monotonic() + self._seconds
         self._reader = threading.Thread(target=self._read_messages, daemon=True)
         self._reader.start()
 
     @property
-    def progress(self) -> Progress | None:
+    def progress(self) -> Progress | Done | None:
         """The latest progress; None before the first report."""
         return self._progress
 
-    def poll(self) -> Outcome | None:
-        """The outcome of the task, or None while it is running.
+    def poll(self) -> Result | None:
+        """The result of the job, or None while it is running.
 
         Raises
         ------
         QC3DError
-            The error that ended the work; a WorkerError if the process crashed or exceeded its limits.
+            The error that ended a task; a WorkerError if the process crashed or exceeded its limits. A run raises
+            nothing: its result has the error in the place of each task that had not ended yet.
         """
+        try:
+            found: Outcome | Outcomes | Corrected | None = self._polled()
+        except QC3DError as error:
+            if not isinstance(self._job, Run):
+                raise
+            found = self.outcomes(error)
+        return cast("Result | None", found)
+
+    def outcomes(self, otherwise: QC3DError) -> Outcomes:
+        """The outcomes of the tasks of a run that have ended by now, and for the others the error ``otherwise``."""
+        assert isinstance(self._job, Run)
+        self._collect()
+        return [self._arrived.get(number, otherwise) for number in range(len(self._job.tasks))]
+
+    def _polled(self) -> Outcome | Outcomes | Corrected | None:
         if self._process.poll() is None:
+            self._collect()
             if self._is_garbled:
                 self.close()
                 raise WorkerError(_GARBLED)
@@ -115,23 +163,54 @@ class Worker:
             if clock.monotonic() > self._deadline:
                 self.close()
                 raise WorkerError(
-                    f"The work was stopped after its time limit of {self._limits.seconds:g} s; raise the limit in the "
+                    f"The work was stopped after its time limit of {self._seconds:g} s; raise the limit in the "
                     "add-on's preferences, or choose a lower quality."
                 )
             return None
-        _kill(self._process)  # processes that the child started may outlive it and keep the pipe open
+        kill(self._process)  # processes that the child started may outlive it and keep the pipe open
         self._reader.join()
         try:
+            self._collect()
             return self._result()
         finally:
             self.close()
+
+    def _collect(self) -> None:
+        """Read the outcomes of the tasks of a run that have ended since."""
+        while not self._is_closed and not self._ended_tasks.empty():
+            task, error = self._ended_tasks.get()
+            if not isinstance(self._job, Run) or task is None or task >= len(self._job.tasks):
+                self._is_garbled = True
+            elif error is not None:
+                self._arrived[task] = self._error(error)
+            else:
+                try:
+                    found = self._read(folder_of(self._folder.path, task), self._job.tasks[task])
+                    self._arrived[task] = cast("Outcome", found)
+                except WorkerError as unreadable:
+                    self._arrived[task] = unreadable
+
+    @staticmethod
+    def _read(folder: Path, job: Task | Corrections) -> Outcome | Corrected:
+        try:
+            return read_corrected(folder, job) if isinstance(job, Corrections) else read_outcome(folder, job)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+            raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
+
+    def _error(self, told: tuple[str, str]) -> QC3DError:
+        """The error that the child told by its type and its sentence."""
+        kind, sentence = told
+        if kind == MemoryError.__name__:
+            return WorkerError(_out_of_memory(self._limits))
+        known = getattr(errors, kind, None)
+        return known(sentence) if isinstance(known, type) and issubclass(known, QC3DError) else WorkerError(sentence)
 
     def close(self) -> None:
         """Stop the child if it is still running, and remove its files. Calling it again does nothing."""
         if self._is_closed:
             return
         self._is_closed = True
-        _kill(self._process)
+        kill(self._process)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with contextlib.suppress(OSError):
@@ -149,7 +228,7 @@ class Worker:
         package = Path(__file__).resolve().parent.parent
         memory = self._limits.memory_mb * 2**20
         # Without the interpreter's own packages: the child must use the same libraries as this process.
-        command = [python, "-I", "-S", CHILD, package, self._folder.path, memory, *_library_folders()]
+        command = [python, "-I", "-S", CHILD, package, self._folder.path, memory, *library_folders()]
         flags = 0
         if sys.platform == "win32":
             flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
@@ -179,33 +258,28 @@ class Worker:
 
     def _take(self, text: bytes) -> None:
         try:
-            message = _message(text)
+            message = messages.parsed(text)
         except (ValueError, TypeError, RecursionError):
             self._is_garbled = True
             return
-        if isinstance(message, Progress):
+        if not isinstance(message, Ending):
             self._progress = message
-        else:
+        elif message.task is None:
             self._ending = message
+        else:
+            self._ended_tasks.put(message)
 
-    def _result(self) -> Outcome:
+    def _result(self) -> Outcome | Outcomes | Corrected:
         ending, status = self._ending, self._process.returncode
         if self._is_garbled:
             raise WorkerError(_GARBLED)
-        if ending:
-            kind, sentence = ending
-            if kind == MemoryError.__name__:
-                raise WorkerError(_out_of_memory(self._limits))
-            known = getattr(errors, kind, None)
-            if isinstance(known, type) and issubclass(known, QC3DError):
-                raise known(sentence)
-            raise WorkerError(sentence)
+        if ending is not None and ending.error is not None:
+            raise self._error(ending.error)
         if ending is None or status != 0:
-            raise WorkerError(_how_it_ended(status, self._errors))
-        try:
-            return read_outcome(self._folder.path, self._task)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
-            raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
+            raise WorkerError(how_it_ended(status, self._errors))
+        if isinstance(self._job, Run):
+            return self.outcomes(WorkerError(_GARBLED))
+        return self._read(self._folder.path, self._job)
 
 
 _HANGS = (
@@ -231,79 +305,35 @@ def _out_of_memory(limits: Limits) -> str:
     return f"There is not enough memory{limit}; use fewer in-betweens, a lower quality or a smaller mesh{more}."
 
 
-def _message(text: bytes) -> Progress | list[str]:
-    """Parse a message of the child: progress, or how the work ended; ValueError or TypeError if it is neither."""
-    message = json.loads(text)
-    if message == {"done": True}:
-        return []
-    if set(message) == {"progress"}:
-        stage, fraction, fit, fits = message["progress"]
-        if stage in STAGES and 0.0 <= fraction <= 1.0 and type(fit) is type(fits) is int and 0 <= fit <= fits:
-            return Progress(stage, float(fraction), fit, fits)
-    elif set(message) == {"error"}:
-        kind, sentence = message["error"]
-        if isinstance(kind, str) and isinstance(sentence, str):
-            return [kind, sentence]
-    raise ValueError("not a message")
+OnProgress = Callable[[Progress], None]
 
 
-def run(task: Task, on_progress: Callable[[Progress], None] | None = None, limits: Limits | None = None) -> Outcome:
-    """Carry out a task in a child process and wait for its outcome.
+@overload
+def run(job: Task, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Outcome: ...
+@overload
+def run(job: Corrections, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Corrected: ...
+@overload
+def run(job: Run, on_progress: Callable[[Done], None] | None = None, limits: Limits | None = None) -> Outcomes: ...
+def run(
+    job: Job, on_progress: Callable[..., None] | None = None, limits: Limits | None = None
+) -> Outcome | Outcomes | Corrected:
+    """Carry out a job in a child process and wait for its result.
 
     Raises
     ------
     QC3DError
         As ``Worker`` and ``Worker.poll``.
     """
-    worker = Worker(task, limits)
+    worker: Worker[Any] = Worker(job, limits)
     shown = None
     try:
         while True:
-            outcome = worker.poll()
+            result = worker.poll()
             if on_progress is not None and worker.progress is not None and worker.progress != shown:
                 shown = worker.progress
                 on_progress(shown)
-            if outcome is not None:
-                return outcome
+            if result is not None:
+                return cast("Outcome | Outcomes | Corrected", result)
             clock.sleep(_POLL_SECONDS)
     finally:
         worker.close()
-
-
-def _library_folders() -> list[Path]:
-    """The folders that contain the libraries, found without importing them."""
-    folders = []
-    for name in _LIBRARIES:
-        spec = importlib.util.find_spec(name)
-        if spec is not None and spec.origin is not None:
-            folders.append(Path(spec.origin).resolve().parent.parent)
-        elif name != "pytetwild":
-            raise InputError(f"{name} is not installed for this Python; install the extension again.")
-    return list(dict.fromkeys(folders))
-
-
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End the child and all processes that it started, which may outlive it."""
-    if sys.platform != "win32":
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-    elif process.poll() is None:
-        # By its full path: Windows would search the working folder first.
-        taskkill = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "taskkill.exe")
-        subprocess.run([taskkill, "/T", "/F", "/PID", str(process.pid)], capture_output=True, check=False)
-        process.kill()
-    process.wait()
-
-
-def _how_it_ended(status: int, errors_file: Path) -> str:
-    text = errors_file.read_text(encoding="utf-8", errors="replace") if errors_file.exists() else ""
-    lines = text.strip().splitlines()
-    if status < 0:
-        name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
-        reason = "; memory may have run out" if -status == signal.SIGKILL else ""
-        how = f"was ended by {name}{reason}"
-    else:
-        how = f"ended without a result (exit status {status})"
-    last = f" Its last message: {lines[-1][:300]}" if lines else ""
-    advice = "nothing was changed. Try again, with a lower quality if need be."
-    return f"The background process {how}; {advice}{last}"

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.collision.colliders import Collider
+from ..solver.combinations.corrections import Corrected, Corrections
 from ..solver.files.npz import write_arrays
 from ..solver.frames.bake import Bake
+from ..solver.frames.many import Run
 from ..solver.frames.report import BakeReport
 from ..solver.frames.task import Outcome, Task
 from ..solver.keys.halves import MirrorPlane
@@ -22,13 +24,47 @@ from ..solver.keys.keypair import KeyPair
 from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
 _PAIR = ("key0", "key1", "faces", "edges", "polygons")
-_TASK, _OUTCOME = "task.json", "outcome.json"
+_OF_CORRECTIONS = ("base", "alone", "sculpted", "places", "values", "faces", "edges")
+_TASK, _OUTCOME, _RUN, _CORRECTIONS = "task.json", "outcome.json", "run.json", "corrections.json"
 
 
-def write_task(folder: Path, task: Task) -> None:
-    """Write a task into an empty folder; ``read_task`` reads it."""
+def write_run(folder: Path, run: Run) -> None:
+    """Write a run into an empty folder; arrays that tasks have in common are written once."""
+    first = None
+    for number, task in enumerate(run.tasks):
+        of_task = folder_of(folder, number)
+        of_task.mkdir(mode=0o700)
+        write_task(of_task, task, first)
+        first = first or next(iter(task.pairs.values()))
+    _write_json(folder / _RUN, {"tasks": len(run.tasks), "memory_mb": run.memory_mb})
+
+
+def read_run(folder: Path) -> Run:
+    """Read the run that ``write_run`` wrote."""
+    header = _read_json(folder / _RUN)
+    tasks: list[Task] = []
+    for number in range(header["tasks"]):
+        first = next(iter(tasks[0].pairs.values())) if tasks else None
+        tasks.append(read_task(folder_of(folder, number), first))
+    return Run(tuple(tasks), header["memory_mb"])
+
+
+def is_run(folder: Path) -> bool:
+    """Whether the folder holds a run."""
+    return (folder / _RUN).exists()
+
+
+def folder_of(folder: Path, number: int) -> Path:
+    """The folder of one of the tasks of a run."""
+    return folder / f"task{number}"
+
+
+def write_task(folder: Path, task: Task, like: KeyPair | None = None) -> None:
+    """Write a task into an empty folder; ``read_task`` reads it. Arrays that are those of ``like`` are left out."""
     for number, (ends, pair) in enumerate(task.pairs.items()):
-        _write(folder / f"pair{number}.npz", **{name: getattr(pair, name) for name in _PAIR})
+        arrays = {name: getattr(pair, name) for name in _PAIR}
+        own = {name: array for name, array in arrays.items() if like is None or array is not getattr(like, name)}
+        _write(folder / f"pair{number}.npz", **own)
         if ends in task.kept:
             (folder / f"kept{number}.map").write_bytes(task.kept[ends])
     np.save(folder / "times.npy", task.times, allow_pickle=False)
@@ -45,8 +81,8 @@ def write_task(folder: Path, task: Task) -> None:
     _write_json(folder / _TASK, header)
 
 
-def read_task(folder: Path) -> Task:
-    """Read the task that ``write_task`` wrote."""
+def read_task(folder: Path, like: KeyPair | None = None) -> Task:
+    """Read the task that ``write_task`` wrote, beside the same ``like``."""
     header = _read_json(folder / _TASK)
     planes = tuple(
         MirrorPlane(tuple(plane["normal"]), tuple(plane["direction"]), plane["offset"], plane["reach"])
@@ -55,7 +91,8 @@ def read_task(folder: Path) -> Task:
     pairs, kept = {}, {}
     for number, (first, second) in enumerate(header["ends"]):
         with np.load(folder / f"pair{number}.npz", allow_pickle=False) as stored:
-            pairs[first, second] = replace(KeyPair(*(stored[name] for name in _PAIR)), planes=planes)
+            arrays = [stored[name] if name in stored.files else getattr(like, name) for name in _PAIR]
+        pairs[first, second] = replace(KeyPair(*arrays), planes=planes)
         path = folder / f"kept{number}.map"
         if path.exists():
             kept[first, second] = path.read_bytes()
@@ -71,6 +108,53 @@ def read_task(folder: Path) -> Task:
     if play is not None:
         play = PlayOptions(**{**play, "also_at": tuple(play["also_at"])})
     return Task(pairs, tuple(header["through"]), *options, times, kept, collider, play)
+
+
+def write_corrections(folder: Path, wanted: Corrections) -> None:
+    """Write what is wanted of keys that are on at once into an empty folder; ``read_corrections`` reads it."""
+    _write(folder / "keys.npz", **{name: getattr(wanted, name) for name in _OF_CORRECTIONS})
+    header = {"find_order": wanted.find_order, "fit_options": asdict(wanted.fit_options)}
+    _write_json(folder / _CORRECTIONS, header)
+
+
+def read_corrections(folder: Path) -> Corrections:
+    """Read what ``write_corrections`` wrote."""
+    header = _read_json(folder / _CORRECTIONS)
+    with np.load(folder / "keys.npz", allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in _OF_CORRECTIONS}
+    return Corrections(**arrays, find_order=header["find_order"], fit_options=FitOptions(**header["fit_options"]))
+
+
+def is_of_corrections(folder: Path) -> bool:
+    """Whether the folder holds what is wanted of keys that are on at once."""
+    return (folder / _CORRECTIONS).exists()
+
+
+def write_corrected(folder: Path, made: Corrected) -> None:
+    """Write the shapes of keys that are on at once into the same folder."""
+    _write(folder / "shapes.npz", shapes=made.shapes)
+    header = {"order": list(made.order), "crossings": made.crossings, "off": made.off, "is_sculpted": made.is_sculpted}
+    _write_json(folder / _OUTCOME, header)
+
+
+def read_corrected(folder: Path, wanted: Corrections) -> Corrected:
+    """Read the shapes that ``write_corrected`` wrote.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If they are incomplete, or not what was wanted.
+    """
+    header = _read_json(folder / _OUTCOME)
+    with np.load(folder / "shapes.npz", allow_pickle=False) as stored:
+        shapes = stored["shapes"]
+    if sorted(header["order"]) != list(range(len(wanted.alone))):
+        raise ValueError("the order is not that of the keys")
+    if shapes.shape != (len(wanted.places), *wanted.base.shape) or not np.isfinite(shapes).all():
+        raise ValueError("the shapes are not those asked for")
+    return Corrected(
+        tuple(header["order"]), shapes, int(header["crossings"]), float(header["off"]), bool(header["is_sculpted"])
+    )
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:

@@ -6,9 +6,11 @@
 
 PACKAGE is the folder of this package, under whatever name; FOLDER contains the task and receives the outcome; MEMORY is
 the number of bytes that the work may allocate, 0 for no limit; LIBRARIES are the folders that contain numpy, scipy and
-pytetwild. Messages go to standard output, each a JSON object followed by a zero byte: ``{"progress": [stage, fraction,
-fit, fits]}`` during the work, and at the end ``{"done": true}`` or ``{"error": [type, message]}``. When standard input
-closes, the parent is gone, and this process ends.
+pytetwild. Messages go to standard output, each a JSON object of :mod:`qc3d_addon.worker.messages` followed by a zero
+byte: ``{"progress": [stage, fraction, fit, fits]}`` during the work, and at the end ``{"done": true}`` or ``{"error":
+[type, message]}``. Of a run of several tasks: ``{"run": [ended, tasks, share]}`` during the work, and ``{"ended":
+[number]}`` or ``{"ended": [number, type, message]}`` when a task has ended. When standard input closes, the parent is
+gone, and this process ends.
 """
 
 from __future__ import annotations
@@ -27,8 +29,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
-# Parts of the messages of threads, SuperLU and Qhull when they run out of memory.
-_WORDS_OF_TOO_LITTLE_MEMORY = ("start new thread", "malloc", "memory")
 _NICE = 5  # lower priority than the window in which the user works
 
 
@@ -46,33 +46,10 @@ def main(arguments: list[str]) -> None:
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
     importlib.import_module(f"{name}.start").one_thread_each()
-    errors = importlib.import_module(f"{name}.solver.errors")
-    try:
-        task = importlib.import_module(f"{name}.solver.frames.task")
-        exchange = importlib.import_module(f"{name}.worker.exchange")
-        _limit_memory(memory)  # after loading the libraries: OpenBLAS waits forever if it gets no memory
-        steps = task.carry_out(exchange.read_task(folder))
-        while True:
-            try:
-                progress = next(steps)
-            except StopIteration as stop:
-                exchange.write_outcome(folder, stop.value)
-                break
-            _send(messages, {"progress": list(progress)})
-    except errors.QC3DError as error:
-        _send(messages, {"error": [type(error).__name__, str(error)]})
-    except MemoryError:
-        _send(messages, {"error": ["MemoryError", ""]})
-    except OSError as error:
-        where = f" ({error.filename})" if error.filename else ""
-        sentence = f"The background process cannot go on: {errors.with_remedy(error)}{where}."
-        _send(messages, {"error": ["WorkerError", sentence]})
-    except RuntimeError as error:
-        if not any(word in str(error).lower() for word in _WORDS_OF_TOO_LITTLE_MEMORY):
-            raise
-        _send(messages, {"error": ["MemoryError", ""]})
-    else:
-        _send(messages, {"done": True})
+    work = importlib.import_module(f"{name}.worker.work")
+    _limit_memory(memory)  # after loading the libraries: OpenBLAS waits forever if it gets no memory
+    for message in work.messages(folder):
+        _send(messages, message)
 
 
 def _load(package: Path) -> str:

@@ -19,11 +19,12 @@ import qc3d_addon  # noqa: E402
 from qc3d_addon.blender.keys import drivers  # noqa: E402
 from qc3d_addon.blender.keys.control import slider_path  # noqa: E402
 from qc3d_addon.blender.store import records  # noqa: E402
-from qc3d_addon.solver.fit import fit_pair  # noqa: E402
-from qc3d_addon.solver.frames.task import Outcome, Task, carry_out  # noqa: E402
+from qc3d_addon.solver.fit import volume  # noqa: E402
+from qc3d_addon.solver.frames.many import Run  # noqa: E402
+from qc3d_addon.solver.frames.task import Task, carry_out  # noqa: E402
 from qc3d_addon.solver.meshing.cube import FilledCube  # noqa: E402
 from qc3d_addon.solver.settings import FitOptions  # noqa: E402
-from qc3d_addon.solver.support.progress import Progress, finish  # noqa: E402
+from qc3d_addon.solver.support.progress import finish  # noqa: E402
 from qc3d_addon.solver.tets.mesh import TetMesh  # noqa: E402
 from qc3d_addon.worker import client  # noqa: E402
 
@@ -48,11 +49,11 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
     """
     calls = []
 
-    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions) -> FilledCube:
+    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions, *_: object) -> FilledCube:
         calls.append(options)
         return six_tetrahedra()
 
-    monkeypatch.setattr(fit_pair, "fill_cube", fill_cube)
+    monkeypatch.setattr(volume, "fill_cube", fill_cube)
     _work_here(monkeypatch)
     return calls
 
@@ -71,8 +72,8 @@ def work_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _work_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run(task: Task, on_progress: Callable[[Progress], None] | None, limits: object) -> Outcome:
-        return finish(carry_out(task), on_progress)
+    def run(job: Task | Run, on_progress: Callable[..., None] | None, limits: object) -> object:
+        return job.outcomes(on_progress) if isinstance(job, Run) else finish(carry_out(job), on_progress)
 
     monkeypatch.setattr(client, "run", run)
 

@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.combinations.combine import combine, finished
+from qc3d_addon.blender.combinations.combine import combine, plan_combination, write_combination
 from qc3d_addon.blender.keys.control import value_path
 from qc3d_addon.blender.store import combined_keys
 from qc3d_addon.solver.combinations.base import KeysOnBase
 from qc3d_addon.solver.combinations.composer import Composer
 from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.worker import client
 
 from ..solver.combinations.arm import arm, posed
 
@@ -63,7 +66,7 @@ def off(shape: np.ndarray, truth: np.ndarray) -> float:
 def test_both_on_is_the_pose_and_each_alone_is_as_it_was(rig: bpy.types.Object, shown: Shown) -> None:
     alone = [at(rig, shown, *values) for values in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.0, 0.3))]
     assert off(at(rig, shown, 1.0, 1.0), BOTH) > 0.3
-    made = finished(combine(rig, ["Bend", "Raise"]))
+    made = combine(rig, ["Bend", "Raise"])
     assert made.combined.keys == ("Raise", "Bend")
     assert len(made.combined.made) == 4
     assert off(at(rig, shown, 1.0, 1.0), BOTH) < 1e-5
@@ -75,7 +78,7 @@ def test_the_whole_square_moves_rightly(rig: bpy.types.Object, shown: Shown) -> 
     """At values between those of the keys that were made: what each key shows there, composed."""
     alone = {(n, v): at(rig, shown, *(v * (n == m) for m in range(2))) for n in range(2) for v in (0.25, 0.6, 0.8, 1.0)}
     sums = {(a, b): at(rig, shown, a, b) for a in (0.25, 0.6, 0.8) for b in (0.25, 0.6, 0.8)}
-    finished(combine(rig, ["Raise", "Bend"]))
+    combine(rig, ["Raise", "Bend"])
     composer = Composer(KeysOnBase(REST, [alone[0, 1.0], alone[1, 1.0]], FACES))
     worst = sums_worst = 0.0
     for (a, b), total in sums.items():
@@ -87,18 +90,18 @@ def test_the_whole_square_moves_rightly(rig: bpy.types.Object, shown: Shown) -> 
 
 
 def test_a_muted_key_takes_its_combination_along(rig: bpy.types.Object, shown: Shown) -> None:
-    finished(combine(rig, ["Raise", "Bend"]))
+    combine(rig, ["Raise", "Bend"])
     rig.data.shape_keys.key_blocks["Raise"].mute = True
     np.testing.assert_allclose(at(rig, shown, 1.0, 1.0), BENT, atol=1e-5)
 
 
 def test_the_order_can_be_turned(rig: bpy.types.Object, shown: Shown) -> None:
-    made = finished(combine(rig, ["Bend", "Raise"], find_order=False))
+    made = combine(rig, ["Bend", "Raise"], find_order=False)
     assert made.combined.keys == ("Bend", "Raise")
     wrong = at(rig, shown, 1.0, 1.0)
     assert off(wrong, BOTH) > 0.1
     names = [key.name for key in rig.data.shape_keys.key_blocks]
-    again = finished(combine(rig, ["Bend", "Raise"]))
+    again = combine(rig, ["Bend", "Raise"])
     assert again.combined.keys == ("Raise", "Bend")
     assert [key.name for key in rig.data.shape_keys.key_blocks] == names
     assert off(at(rig, shown, 1.0, 1.0), BOTH) < 1e-5
@@ -121,7 +124,7 @@ def test_a_shape_of_her_own_is_met_and_led_to(rig: bpy.types.Object, shown: Show
     before = at(rig, shown, 1.0, 1.0)
     half_before = at(rig, shown, 0.5, 0.5)
     halves = [at(rig, shown, 0.5, 0.0), at(rig, shown, 0.0, 0.5)]
-    made = finished(combine(rig, ["Raise", "Bend"]))
+    made = combine(rig, ["Raise", "Bend"])
     assert made.is_sculpted
     assert len(made.combined.made) == 3
     np.testing.assert_allclose(at(rig, shown, 1.0, 1.0), before, atol=1e-5)
@@ -144,7 +147,7 @@ def test_a_shape_of_her_own_that_a_bone_or_property_drives(rig: bpy.types.Object
     variable = driver.variables.new()
     variable.name, variable.targets[0].id, variable.targets[0].data_path = "v", rig, '["both"]'
     driver.expression = "v"
-    made = finished(combine(rig, ["Raise", "Bend"]))
+    made = combine(rig, ["Raise", "Bend"])
     assert made.is_sculpted
     assert driver.expression == "v"
     rig["both"] = 1.0
@@ -161,7 +164,7 @@ def test_in_betweens_and_drivers_of_the_keys_are_respected(
     variable = driver.variables.new()
     variable.name, variable.targets[0].id, variable.targets[0].data_path = "v", rig, '["raise"]'
     driver.expression = "v"
-    made = finished(combine(rig, ["Raise", "Bend"]))
+    made = combine(rig, ["Raise", "Bend"])
     assert driver.expression == "v"
     assert len(made.combined.made) == 4
     keys.key_blocks["Bend"].value = 1.0
@@ -174,8 +177,8 @@ def test_three_keys(rig: bpy.types.Object, shown: Shown) -> None:
     above = np.maximum(REST[:, 0] - 3.2, 0.0)
     add_key(rig, "Wrist", REST + np.stack([0.0 * above, above**2, 0.0 * above], axis=1))
     for pair in (("Raise", "Bend"), ("Raise", "Wrist"), ("Bend", "Wrist")):
-        finished(combine(rig, pair))
-    made = finished(combine(rig, ["Wrist", "Bend", "Raise"]))
+        combine(rig, pair)
+    made = combine(rig, ["Wrist", "Bend", "Raise"])
     assert made.combined.keys == ("Raise", "Bend", "Wrist")
     rig.data.shape_keys.key_blocks["Wrist"].value = 1.0
     wrist = REST + np.stack([0.0 * above, above**2, 0.0 * above], axis=1)
@@ -195,7 +198,7 @@ def test_a_mirrored_half_moves_as_the_whole_and_its_seam_stays(shown: Shown) -> 
     for name, shape in (("Basis", REST), ("Raise", RAISED), ("Swell", swell)):
         add_key(obj, name, shape[used])
     obj.modifiers.new("Mirror", 'MIRROR').use_axis = (False, False, True)
-    finished(combine(obj, ["Raise", "Swell"]))
+    combine(obj, ["Raise", "Swell"])
     obj.modifiers.clear()
     for name in ("Raise", "Swell"):
         obj.data.shape_keys.key_blocks[name].value = 1.0
@@ -229,15 +232,15 @@ def test_what_cannot_be_changes_nothing(rig: bpy.types.Object, state: State) -> 
         (["Raise", "Basis"], "relative to"),
     ):
         with pytest.raises(InputError, match=said):
-            finished(combine(rig, chosen))
+            combine(rig, chosen)
     assert state() == before
-    finished(combine(rig, ["Raise", "Bend"]))
+    combine(rig, ["Raise", "Bend"])
     rig.data.shape_keys.key_blocks["Raise_Bend_50_50"].lock_shape = True
     before = state()
     with pytest.raises(InputError, match="locked"):
-        finished(combine(rig, ["Raise", "Bend"]))
+        combine(rig, ["Raise", "Bend"])
     with pytest.raises(InputError, match="corrects others"):
-        finished(combine(rig, ["Raise", "Raise_Bend_50_50"]))
+        combine(rig, ["Raise", "Raise_Bend_50_50"])
     assert state() == before
 
 
@@ -245,7 +248,7 @@ def test_what_cannot_be_changes_nothing(rig: bpy.types.Object, state: State) -> 
 def test_a_damaged_record_is_said(text: object, rig: bpy.types.Object) -> None:
     rig.data.shape_keys[combined_keys.PROPERTY] = text
     with pytest.raises(InputError, match="damaged"):
-        finished(combine(rig, ["Raise", "Bend"]))
+        combine(rig, ["Raise", "Bend"])
 
 
 def test_verdicts(rig: bpy.types.Object) -> None:
@@ -260,7 +263,65 @@ def test_verdicts(rig: bpy.types.Object) -> None:
 
 
 def test_in_a_file_it_plays_without_the_addon(rig: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
-    finished(combine(rig, ["Raise", "Bend"]))
+    combine(rig, ["Raise", "Bend"])
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "arm.blend"), use_scripts=False)
     assert off(at(bpy.data.objects["Arm"], shown, 1.0, 1.0), BOTH) < 1e-5
+
+
+COMBINE = {"first": "Bend", "second": "Raise"}
+
+
+def test_the_button_works_in_a_child_process(rig: bpy.types.Object, shown: Shown) -> None:
+    assert bpy.ops.qc3d.combine_keys(**COMBINE) == {'FINISHED'}
+    assert off(at(rig, shown, 1.0, 1.0), BOTH) < 1e-5
+    with pytest.raises(RuntimeError, match="are of two or three different keys, and 1 were named"):
+        bpy.ops.qc3d.combine_keys(first="Bend")
+
+
+def test_interrupted_nothing_is_written(
+    rig: bpy.types.Object, state: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = state()
+    monkeypatch.setattr(client, "run", interrupted)
+    with pytest.raises(RuntimeError, match="Combine Keys was interrupted; nothing was changed"):
+        bpy.ops.qc3d.combine_keys(**COMBINE)
+    assert state() == before
+
+
+@pytest.mark.parametrize("which", ["sculpted", "removed", "deleted"])
+def test_keys_that_change_meanwhile(rig: bpy.types.Object, which: str) -> None:
+    plan = plan_combination(rig, ["Bend", "Raise"])
+    corrected = finish(plan.task.carried_out())
+    blocks = rig.data.shape_keys.key_blocks
+    if which == "sculpted":
+        blocks["Bend"].points[0].co.x += 0.5
+    elif which == "removed":
+        rig.shape_key_remove(blocks["Bend"])
+    else:
+        bpy.data.objects.remove(rig)
+    names = blocks.keys() if which != "deleted" else []
+    with pytest.raises(InputError, match="meanwhile; nothing was written"):
+        write_combination(plan, corrected)
+    if which != "deleted":
+        assert blocks.keys() == names
+
+
+def test_a_combination_of_keys_that_have_changed_since_is_outdated(rig: bpy.types.Object) -> None:
+    combine(rig, ["Bend", "Raise"])
+    keys = rig.data.shape_keys
+    (made,) = combined_keys.read(keys)
+    assert not combined_keys.is_outdated(keys, made)
+    before = keys.key_blocks["Bend"].points[0].co.x
+    keys.key_blocks["Bend"].points[0].co.x += 0.5
+    assert combined_keys.is_outdated(keys, made)
+    keys.key_blocks["Bend"].points[0].co.x = before
+    assert not combined_keys.is_outdated(keys, made)
+    keys.key_blocks["Basis"].points[0].co.x += 0.5
+    assert combined_keys.is_outdated(keys, made)
+    combine(rig, ["Bend", "Raise"])
+    assert not combined_keys.is_outdated(keys, combined_keys.read(keys)[0])
+    assert not combined_keys.is_outdated(keys, replace(made, digests=()))  # an earlier version did not keep them

@@ -96,17 +96,25 @@ print(" ".join(UsdSkel.BindingAPI(mesh).GetBlendShapesAttr().Get()))
 """
 
 
-@pytest.mark.parametrize("ending", [".usda", ".usdc"])
-def test_usd(ending: str, played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
-    truth = motion(played, shown)
-    path, frames = tmp_path / f"figure{ending}", tmp_path / "frames.npy"
-    assert export(played, path) == []
-    # By usd-core, in a process of its own: Blender's USD and this one do not know of each other.
+def read_usd(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names of the shapes, and the motion.
+
+    By usd-core, in a process of its own: Blender's USD and this one do not know of each other.
+    """
+    frames = path.with_suffix(".npy")
     command = [sys.executable, "-c", READ_USD, str(path), str(FIRST), str(LAST), str(frames)]
     names = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert names.returncode == 0, names.stderr
-    assert names.stdout.split() == ["Lean", "Stretch"]
-    found = np.load(frames)
+    return names.stdout.split(), np.load(frames)
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdc"])
+def test_usd(ending: str, played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
+    truth = motion(played, shown)
+    path = tmp_path / f"figure{ending}"
+    assert export(played, path) == []
+    names, found = read_usd(path)
+    assert names == ["Lean", "Stretch"]
     assert largest_distance(found, truth, f"USD ({ending})") < STRAIGHT_PARTS
 
 
@@ -141,35 +149,112 @@ os._exit(0)  # this version of ufbx may crash where it tidies up
 """
 
 
-def test_fbx(played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
-    truth = motion(played, shown)
-    path, frames = tmp_path / "figure.fbx", tmp_path / "frames.npy"
-    assert export(played, path) == []
-    basis = played.data.shape_keys.reference_key
+def rest_of(obj: bpy.types.Object) -> np.ndarray:
+    basis = obj.data.shape_keys.reference_key
     rest = np.empty(3 * len(basis.points), dtype=np.float32)
     basis.points.foreach_get("co", rest)
-    rest = rest.reshape(-1, 3)
+    return rest.reshape(-1, 3)
+
+
+def read_fbx(path: Path, rest: np.ndarray) -> tuple[list[str], np.ndarray]:
+    """Names of the channels with the number of their shapes, and the motion."""
+    frames = path.with_suffix(".npy")
     numbers = [FIRST, LAST, bpy.context.scene.render.fps, len(rest)]
     command = [sys.executable, "-c", READ_FBX, str(path), *map(str, numbers), str(frames)]
     read = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert read.returncode == 0, read.stderr
-    assert read.stdout.splitlines() == ["Lean 13", "Stretch 1"]
-    assert largest_distance(rest + np.load(frames), truth, "FBX") < STRAIGHT_PARTS
+    return read.stdout.splitlines(), rest + np.load(frames)
+
+
+def test_fbx(played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
+    truth = motion(played, shown)
+    path = tmp_path / "figure.fbx"
+    assert export(played, path) == []
+    channels, found = read_fbx(path, rest_of(played))
+    assert channels == ["Lean 13", "Stretch 1"]
+    assert largest_distance(found, truth, "FBX") < STRAIGHT_PARTS
+
+
+def assert_gltf_moves(path: Path, obj: bpy.types.Object, truth: np.ndarray) -> None:
+    times, found, base = _gltf_motion(path)
+    np.testing.assert_allclose(times, np.arange(FIRST, LAST + 1) / bpy.context.scene.render.fps, atol=1e-6)
+    # glTF's y is up, and it splits vertices: those of Blender are found by where they are in the base.
+    rest = rest_of(obj)
+    number = np.linalg.norm(rest[None] - base[:, None], axis=2).argmin(axis=1)
+    assert np.abs(rest[number] - base).max() < 1e-5
+    assert largest_distance(found, truth[:, number], "glTF") < ROUNDING
 
 
 def test_gltf(played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
     truth = motion(played, shown)
     path = tmp_path / "figure.glb"
     assert export(played, path) == []
-    times, found, base = _gltf_motion(path)
-    np.testing.assert_allclose(times, np.arange(FIRST, LAST + 1) / bpy.context.scene.render.fps, atol=1e-6)
-    # glTF's y is up, and it splits vertices: those of Blender are found by where they are in the base.
-    rest = np.empty(truth[0].size, dtype=np.float32)
-    played.data.shape_keys.reference_key.points.foreach_get("co", rest)
-    rest = rest.reshape(-1, 3)
-    number = np.linalg.norm(rest[None] - base[:, None], axis=2).argmin(axis=1)
-    assert np.abs(rest[number] - base).max() < 1e-5
-    assert largest_distance(found, truth[:, number], "glTF") < ROUNDING
+    assert_gltf_moves(path, played, truth)
+
+
+class TestSliders:
+    """In-betweens that a slider plays become in-betweens of a shape of its name."""
+
+    # From Stretch to Lean vertices travel about twice as far as from the Basis to Lean.
+    BOUND = 2.0 * STRAIGHT_PARTS
+
+    @pytest.fixture(params=["Basis", "Stretch"])
+    def slid(self, request: pytest.FixtureRequest, figure: bpy.types.Object) -> bpy.types.Object:
+        """The figure with in-betweens from the Basis, or from another key, which an animated slider plays."""
+        scene = bpy.context.scene
+        scene.frame_start, scene.frame_end = FIRST, LAST
+        keys = {"from_key": request.param, "to_key": "Lean", "mode": "linear", "easing": "ease-in-out"}
+        assert bpy.ops.qc3d.bake_inbetweens(**keys, count=3, play_on="slider") == {"FINISHED"}
+        slider = f"{request.param}_to_Lean"
+        for frame, value in ((FIRST, 0.0), (LAST, 1.0)):
+            figure[slider] = value
+            figure.keyframe_insert(f'["{slider}"]', frame=frame)
+        return figure
+
+    @staticmethod
+    def shapes_of(obj: bpy.types.Object) -> list[str]:
+        blocks = obj.data.shape_keys.key_blocks.keys()
+        name = "Stretch_to_Lean" if any("Stretch_to_Lean" in one for one in blocks) else "Basis_to_Lean"
+        return ["Lean", "Stretch", *([f"{name}_start"] if name.startswith("Stretch") else []), name]
+
+    def test_usd(self, slid: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
+        truth = motion(slid, shown)
+        path = tmp_path / "figure.usdc"
+        assert export(slid, path) == []
+        names, found = read_usd(path)
+        assert names == self.shapes_of(slid)
+        assert largest_distance(found, truth, f"USD, {names[-1]}") < self.BOUND
+
+    def test_fbx(self, slid: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
+        truth = motion(slid, shown)
+        path = tmp_path / "figure.fbx"
+        assert export(slid, path) == []
+        channels, found = read_fbx(path, rest_of(slid))
+        names = self.shapes_of(slid)
+        assert channels == [*(f"{name} 1" for name in names[:-1]), f"{names[-1]} 13"]
+        assert largest_distance(found, truth, f"FBX, {names[-1]}") < self.BOUND
+
+    def test_gltf(self, slid: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
+        truth = motion(slid, shown)
+        path = tmp_path / "figure.glb"
+        assert export(slid, path) == []
+        assert_gltf_moves(path, slid, truth)
+
+    def test_everything_is_as_it_was(
+        self, slid: bpy.types.Object, state: Callable[[], dict[str, object]], tmp_path: Path
+    ) -> None:
+        bpy.context.scene.frame_set(5)
+        before = state()
+        for ending in (".usda", ".fbx", ".glb"):
+            export(slid, tmp_path / f"figure{ending}")
+        assert state() == before
+
+    def test_a_slider_that_is_missing_is_said(self, slid: bpy.types.Object, tmp_path: Path) -> None:
+        for name in list(slid.keys()):
+            del slid[name]
+        with pytest.raises(InputError):
+            export(slid, tmp_path / "figure.usda")
+        assert not list(tmp_path.iterdir())
 
 
 def _gltf_motion(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

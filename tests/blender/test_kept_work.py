@@ -14,10 +14,14 @@ import pytest
 from qc3d_addon.blender import compat
 from qc3d_addon.blender.bake.plan import plan_bake, write_bake
 from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.suggested_keys import made_keys, sculpted_between
+from qc3d_addon.blender.keys.leftovers import leftovers
 from qc3d_addon.blender.store.records import Chain, Record
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames.task import carry_out
 from qc3d_addon.solver.support.progress import finish
+
+from .test_panel_results import drawn
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -203,3 +207,79 @@ def test_a_copy_made_by_a_script_plays_by_its_own_slider_after_a_re_bake(
     shown(figure, Basis_to_Lean=0.7)
     np.testing.assert_array_equal(shown(copy), rest)
     assert np.abs(shown(copy, Basis_to_Lean=0.7) - rest).max() > 0.1
+
+
+def test_a_made_key_that_a_driver_reads_stays_when_a_new_bake_has_none_at_its_place(figure: bpy.types.Object) -> None:
+    bake()
+    keys = figure.data.shape_keys
+    curve = keys.driver_add('key_blocks["Stretch"].value')
+    variable = curve.driver.variables.new()
+    target = variable.targets[0]
+    target.id_type, target.id, target.data_path = 'KEY', keys, 'key_blocks["Lean_25"].value'
+    keys.key_blocks["Lean_75"].keyframe_insert("value", frame=3)
+    bake(count=2)
+    said = notes(figure)
+    assert "Key 'Lean_25' stays, with value 0, since 1 driver reads it." in said
+    assert "The keyframes of 'Lean_75', which is gone, stay in the action without effect." in said
+    assert set(newest(figure).keys.values()) == {"Lean_33", "Lean_67"}
+    assert "Lean_75" not in keys.key_blocks
+    stays = keys.key_blocks["Lean_25"]
+    assert (stays.value, stays.slider_min, stays.slider_max) == (0.0, 0.0, 1.0)
+    bpy.context.view_layer.update()
+    assert curve.driver.is_valid
+
+
+class TestJoined:
+    """Blender joins shape keys, but keeps drivers and custom properties of the active object only."""
+
+    def join(self, figure: bpy.types.Object, other_key: str) -> None:
+        other = figure.copy()
+        other.data = figure.data.copy()
+        bpy.context.scene.collection.objects.link(other)
+        bake()
+        bpy.context.view_layer.objects.active = other
+        bake(to_key=other_key)
+        bpy.context.view_layer.objects.active = figure
+        for obj in (figure, other):
+            obj.select_set(True)
+        bpy.ops.object.join()
+
+    def test_keys_without_record_and_drivers_are_said(self, figure: bpy.types.Object) -> None:
+        self.join(figure, "Stretch")
+        keys = figure.data.shape_keys
+        assert leftovers(keys, made_keys(keys)) == ["Stretch_25", "Stretch_50", "Stretch_75"]
+        assert sculpted_between(figure, "Stretch") == {}
+        assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+        assert "'Stretch_25' and 2 more look like in-betweens, but nothing plays them" in notes(figure)
+        assert "The mesh has 84 vertices, and had 42 at the earlier bake, so what was sculpted" in notes(figure)
+        for name in ("Stretch_25", "Stretch_50", "Stretch_75"):
+            figure.shape_key_remove(keys.key_blocks[name])
+        bake(to_key="Stretch")
+        assert newest(figure).keys == {1: "Stretch_25", 2: "Stretch_50", 3: "Stretch_75"}
+        assert "look like in-betweens" not in notes(figure)
+
+    def test_bakes_of_keys_of_one_name_play_on_together(
+        self, figure: bpy.types.Object, shown: Shown, shapes: ReadShapes
+    ) -> None:
+        self.join(figure, "Lean")
+        keys = figure.data.shape_keys
+        assert leftovers(keys, made_keys(keys)) == []
+        got = shapes(figure)
+        keys.key_blocks["Lean"].value = 0.5
+        middle = 0.5 * (got["Basis"] + got["Lean"]) + got["Lean_50"] - got["Basis"]
+        assert np.abs(shown(figure) - middle).max() < 1e-5
+        bake()
+        assert newest(figure).keys == {1: "Lean_25", 2: "Lean_50", 3: "Lean_75"}
+
+
+def test_a_copy_that_follows_the_original_is_said(figure: bpy.types.Object) -> None:
+    bake(play_on="slider")
+    copy = figure.copy()
+    copy.data = figure.data.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    sentence = "The slider of 'Figure' still plays these in-betweens; re-bake to have their own."
+    assert sentence in drawn(copy).texts
+    assert sentence not in drawn(figure).texts
+    bpy.context.view_layer.objects.active = copy
+    assert bpy.ops.qc3d.rebake() == {"FINISHED"}
+    assert sentence not in drawn(copy).texts

@@ -11,11 +11,12 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.bake.many import Verdict, bakeable_keys
+from qc3d_addon.blender.bake.many import Verdict, bakeable_keys, plan_keys
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.run import bake_object_keys
 from qc3d_addon.blender.store.records import Record
-from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.errors import CanceledError, InputError
+from qc3d_addon.solver.frames.many import Ended, Run
 from qc3d_addon.solver.settings import FrameOptions
 from qc3d_addon.worker import client
 
@@ -116,13 +117,13 @@ def test_the_operator_with_some_keys(face: bpy.types.Object) -> None:
 def test_interrupted_nothing_is_written(
     face: bpy.types.Object, state: State, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, before, calls = client.run, state(), []
+    before = state()
 
-    def interrupted(*arguments: Any) -> object:  # noqa: ANN401
-        calls.append(arguments)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return run(*arguments)
+    def interrupted(job: Run, *_: object) -> object:
+        for step in job.carried_out():
+            if isinstance(step, Ended):
+                raise KeyboardInterrupt
+        raise AssertionError("nothing has ended")
 
     monkeypatch.setattr(client, "run", interrupted)
     with pytest.raises(RuntimeError, match="was interrupted; nothing was changed"):
@@ -137,3 +138,24 @@ def test_twenty_keys_of_a_face(figure: bpy.types.Object) -> None:
     assert len(verdicts) == 22
     assert set(ends(verdicts).values()) == {"baked", "left"}  # the first of them shows nothing
     assert len(on_keys(figure)) == 21
+
+
+def test_what_is_done_is_written_after_a_cancel(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    plan = plan_keys(figure, ["Lean", "Stretch"], EASED, 0.0)
+    (first, *_) = plan.task.outcomes()
+    verdicts = plan.write([first, CanceledError("was not reached before the bake was canceled")])
+    assert ends(verdicts) == {"Lean": "baked", "Stretch": "left"}
+    assert verdicts[1].text == "was not reached before the bake was canceled"
+    assert on_keys(figure) == ["Lean"]
+
+
+def test_a_key_that_would_take_too_much_memory(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    plan = plan_keys(figure, ["Lean"], EASED, 20.0)
+    assert plan.task.tasks == ()
+    assert [verdict.ended for verdict in plan.write([])] == ["failed"]
+
+
+def test_the_volume_around_a_base_is_made_once(figure: bpy.types.Object, quick_map: list[Any]) -> None:
+    add_key(figure, "Nod", lambda rest: rest + np.maximum(rest[:, 2:], 0.0) ** 2 * [0.0, 0.2, -0.05])
+    bake_object_keys(figure, ["Lean", "Nod"], EASED)
+    assert len(quick_map) == 1

@@ -32,6 +32,9 @@ class Layout:
     def prop(self, data: object, name: str, **options: object) -> None:
         self.texts.append(name)
 
+    def prop_search(self, data: object, name: str, *where: object, **options: object) -> None:
+        self.texts.append(name)
+
     def operator(self, name: str, **options: object) -> Button:
         assert hasattr(bpy.ops.qc3d, name.removeprefix("qc3d."))
         self.buttons.append((name.removeprefix("qc3d."), Button()))
@@ -72,6 +75,7 @@ class Context:
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self.active_object = obj
+        self.selected_objects = [obj]
 
 
 def drawn(obj: bpy.types.Object) -> Layout:

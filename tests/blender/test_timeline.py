@@ -17,10 +17,12 @@ from qc3d_addon.blender.bake.timeline import keyed, keys_on_timeline
 from qc3d_addon.blender.keys.control import slider_path, value_path
 from qc3d_addon.blender.keys.double_motion import double_motion
 from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.ui.panels import QC3D_PT_inbetweens
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.settings import FrameOptions
 
 from .conftest import Shapes, add_key
+from .test_panel_results import Context, Layout
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -280,3 +282,25 @@ class TestRows:
         bake_from_the_panel(from_key="Basis", via=[{"name": "Stretch"}], to_key="Lean", use_keyframes=False)
         assert chain_of(animated).via_at == ()
         assert chain_of(animated).keyframes is None
+
+
+def test_the_panel_shows_what_counts(animated: bpy.types.Object) -> None:
+    layout = panel(animated)
+    assert "keys_from_timeline" in [name for name, _ in layout.buttons]
+    assert not {"via_timing", "at", "frame"} & set(layout.texts)
+    assert bpy.ops.qc3d.keys_from_timeline() == {"FINISHED"}
+    texts = panel(animated).texts
+    assert {"via_timing", "frame", "frame_start", "frame_end"} <= set(texts)
+    assert not {"at", "use_keyframes"} & set(texts)  # frames are keyframes
+    animated.qc3d.via_timing = "value"
+    assert {"at", "use_keyframes"} <= set(panel(animated).texts)
+    bake_from_the_panel()
+    assert chain_of(animated).result.count == 4
+
+
+def panel(obj: bpy.types.Object) -> Layout:
+    class Panel:
+        layout = Layout()
+
+    QC3D_PT_inbetweens.draw(Panel(), Context(obj))  # type: ignore[arg-type]
+    return Panel.layout

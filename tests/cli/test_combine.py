@@ -77,3 +77,18 @@ def test_one_sentence_where_it_cannot_be(
     assert said in text
     assert text.count("\n") == 1
     assert not output.exists()
+
+
+def test_of_a_half_the_seam_stays_on_its_plane(tmp_path: Path) -> None:
+    rest, faces = arm()
+    used, own = np.unique(faces[(rest[faces][:, :, 2] > -1e-9).all(axis=1)], return_inverse=True)
+    swell = rest + np.exp(-((rest[:, :1] - 1.1) ** 2) / 0.1) * rest * [0.0, 0.8, 0.8]
+    shapes = [shape[used] for shape in (rest, posed(rest, 60.0, 0.0), swell)]
+    path, names = tmp_path / "half.npz", np.array(["straight", "raised", "bent"])
+    np.savez(path, faces=own.reshape(-1, 3), shape_names=names, V0=shapes[0], V1=shapes[1], V2=shapes[2])
+    heights = []
+    for mirror in ("auto", "none"):
+        assert combine(path, tmp_path / "both.npz", "--mirror", mirror) == 0
+        with np.load(tmp_path / "both.npz") as stored:
+            heights.append(np.abs(stored["shape"][np.abs(shapes[0][:, 2]) < 1e-9, 2]).max())
+    assert heights[0] < 1e-12 < heights[1]

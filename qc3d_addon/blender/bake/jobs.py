@@ -7,19 +7,22 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
 from .. import compat
 
 if TYPE_CHECKING:
+    from ...solver.combinations.corrections import Corrections
+    from ...solver.errors import QC3DError
+    from ...solver.frames.many import Run
     from ...solver.frames.task import Outcome, Task
     from ...worker.client import Limits
 
 
 class Job:
-    """A task that runs in a child process, as the panel shows it: number ``part``, from 0, of ``parts`` tasks.
+    """A task, or a run of several, in a child process, as the panel shows it.
 
     Raises
     ------
@@ -27,14 +30,13 @@ class Job:
         If the child process cannot be started.
     """
 
-    def __init__(self, label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1) -> None:
+    def __init__(self, label: str, task: Task | Run | Corrections, limits: Limits) -> None:
         from ...worker.client import Worker
 
-        self.label = f"{label} ({part + 1} of {parts})" if parts > 1 else label
-        self._part, self._parts = part, parts
+        self.label = label
         self.is_cancelled = False
         self._started = clock.monotonic()
-        self._worker = Worker(task, limits)
+        self._worker: Worker[Any] = Worker(task, limits)
         self._at_end = ExitStack()
 
     @property
@@ -42,9 +44,14 @@ class Job:
         """Time since its start, in seconds."""
         return clock.monotonic() - self._started
 
-    def poll(self) -> Outcome | None:
-        """The outcome once there is one, otherwise None; raises QC3DError if the task failed."""
-        return self._worker.poll()
+    def poll(self) -> object:
+        """The result once there is one, otherwise None; raises QC3DError if the task failed."""
+        result: object = self._worker.poll()
+        return result
+
+    def outcomes(self, otherwise: QC3DError) -> list[Outcome | QC3DError]:
+        """The outcomes of a run's tasks that have ended by now, also after it was stopped; ``otherwise`` for others."""
+        return self._worker.outcomes(otherwise)
 
     @property
     def stage(self) -> str:
@@ -53,9 +60,8 @@ class Job:
 
     @property
     def fraction(self) -> float:
-        """Fraction of all the tasks that is done, in [0, 1]."""
-        own = 0.0 if self._worker.progress is None else self._worker.progress.overall
-        return (self._part + own) / self._parts
+        """Fraction that is done, in [0, 1]."""
+        return 0.0 if self._worker.progress is None else self._worker.progress.overall
 
     def at_end(self, call: Callable[[], None]) -> None:
         """Call this when the job ends in any way: Blender may drop a running operator without telling it."""
@@ -75,8 +81,8 @@ def current() -> Job | None:
     return _current
 
 
-def begin(label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1) -> Job:
-    """Start a job, or one of several in a row; at most one runs at a time.
+def begin(label: str, task: Task | Run | Corrections, limits: Limits) -> Job:
+    """Start a job; at most one runs at a time.
 
     Raises
     ------
@@ -90,7 +96,7 @@ def begin(label: str, task: Task, limits: Limits, part: int = 0, parts: int = 1)
 
     if _current is not None:
         raise InputError(busy_problem() or "")
-    _current = Job(label, task, limits, part, parts)
+    _current = Job(label, task, limits)
     return _current
 
 

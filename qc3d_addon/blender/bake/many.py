@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import bpy
 import numpy as np
 
-from ...solver.errors import InputError, QC3DError
+from ...solver.errors import CanceledError, InputError, QC3DError
 from ..keys import chain_keys
 from ..kinds import keys_of
 from ..store import checks, combined_keys
@@ -21,6 +21,7 @@ from .plan import Plan, plan_bake, write_bake
 from .request import BakeRequest
 
 if TYPE_CHECKING:
+    from ...solver.frames.many import Run
     from ...solver.frames.task import Outcome
 
 # Relative to the size. A key whose motion leaves the straight blend by less needs no in-betweens.
@@ -81,7 +82,9 @@ def require_own_keys(obj: bpy.types.Object, names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> Plan | Verdict:
+def plan_key(
+    obj: bpy.types.Object | None, name: str, choices: BakeRequest, memory_mb: float = 0.0
+) -> Plan | Verdict:
     """The plan for a key, or the verdict if there is nothing to compute.
 
     Parameters
@@ -102,6 +105,7 @@ def plan_key(obj: bpy.types.Object | None, name: str, choices: BakeRequest) -> P
             if is_whole and chain.digests == tuple(digest(keys.key_blocks[other]) for other in through):
                 return Verdict(name, "left", "already baked, and its keys have not changed", {})
         plan = plan_bake(obj, request)
+        plan.task.require_memory(memory_mb)
     except QC3DError as error:
         return Verdict(name, "failed", str(error), {})
     pair = next(iter(plan.task.pairs.values()))
@@ -114,7 +118,7 @@ def write_key(plan: Plan, outcome: Outcome | QC3DError) -> Verdict:
     """Write the in-betweens of a key unless it needs none; returns the result for the key."""
     name = plan.request.keys[-1]
     if isinstance(outcome, QC3DError):
-        return Verdict(name, "failed", str(outcome), {})
+        return Verdict(name, "left" if isinstance(outcome, CanceledError) else "failed", str(outcome), {})
     missed = _beyond_straight(plan, outcome)
     if missed < STRAIGHT_ENOUGH:
         return Verdict(name, "straight", f"straight is enough: {missed:.2%}", {})
@@ -125,30 +129,50 @@ def write_key(plan: Plan, outcome: Outcome | QC3DError) -> Verdict:
     return Verdict(name, "baked", _words(result.report), result.report)
 
 
-def bake_keys(
-    obj: bpy.types.Object,
-    names: Sequence[str],
-    choices: BakeRequest,
-    carry_out: Callable[[Plan, int], Outcome],
-) -> list[Verdict]:
-    """Bake keys of an object one after the other, each played by its own value; nothing is written before the last.
+@dataclass(frozen=True)
+class ManyPlan:
+    """What to compute for many keys of an object.
 
     Parameters
     ----------
-    carry_out
-        Computes a plan, given the number of its key; may raise QC3DError.
+    plans
+        The plan of each key, or its verdict if there is nothing to compute.
+    task
+        The tasks of the plans, in one run.
     """
-    done: list[tuple[Plan, Outcome | QC3DError] | Verdict] = []
-    for number, name in enumerate(require_own_keys(obj, names)):
-        plan = plan_key(obj, name, choices)
-        if isinstance(plan, Verdict):
-            done.append(plan)
-            continue
-        try:
-            done.append((plan, carry_out(plan, number)))
-        except QC3DError as error:
-            done.append((plan, error))
-    return [one if isinstance(one, Verdict) else write_key(*one) for one in done]
+
+    plans: list[Plan | Verdict]
+    task: Run
+
+    def write(self, outcomes: Sequence[Outcome | QC3DError]) -> list[Verdict]:
+        """Write the in-betweens of every key that has an outcome and needs them; the verdict of each key."""
+        left = iter(outcomes)
+        return [one if isinstance(one, Verdict) else write_key(one, next(left)) for one in self.plans]
+
+    def locate(self) -> bpy.types.Object | None:
+        """The object, even if it was renamed or changed; None if it was deleted or no key has a plan."""
+        return next((one.locate() for one in self.plans if isinstance(one, Plan)), None)
+
+
+def plan_keys(obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, memory_mb: float) -> ManyPlan:
+    """Plan to bake keys of an object in one run, each played by its own value.
+
+    Parameters
+    ----------
+    memory_mb
+        Memory that the run may take, in megabytes; a key that would need more gets a verdict.
+
+    Raises
+    ------
+    InputError
+        If a name is that of no key that can play in-betweens, or there are none.
+    """
+    from ...solver.frames.many import Run
+
+    plans = [plan_key(obj, name, choices, memory_mb) for name in require_own_keys(obj, names)]
+    run = Run.of([one.task for one in plans if isinstance(one, Plan)], memory_mb)
+    tasks = iter(run.tasks)
+    return ManyPlan([replace(one, task=next(tasks)) if isinstance(one, Plan) else one for one in plans], run)
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:

@@ -15,7 +15,8 @@ from ...solver.errors import InputError, naming_pair
 from ..kinds import keys_of
 from ..store import checks, mesh_data
 from ..store.records import Chain, Record
-from .plan import kept_map, request_again
+from .plan import kept_map
+from .plan_again import request_again
 
 if TYPE_CHECKING:
     from ...solver.fit.files import KeptMaps

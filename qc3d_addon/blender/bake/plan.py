@@ -18,6 +18,7 @@ import numpy as np
 from ...solver.errors import InputError
 from ..keys import chain_keys, chain_shapes, own_keyframes, shape_keys
 from ..keys.double_motion import double_motion, unknown_inbetweens
+from ..keys.leftovers import leftovers, sentence
 from ..keys.sculpted import Sculpted
 from ..kinds import keys_of
 from ..store import checks, mesh_data, names
@@ -25,16 +26,13 @@ from ..store.records import Chain, KeptMap, Record
 from ..store.renames import digest
 from ..store.summaries import Summary
 from . import bookkeeping, colliders
-from .request import PREVIEW_STEPS, BakeRequest, BakeResult
+from .request import BakeRequest, BakeResult
+from .suggested_keys import made_keys
 
 if TYPE_CHECKING:
     from ...solver.frames.task import Outcome, Task
     from ...solver.keys.keypair import KeyPair
     from ...solver.settings import FitOptions
-
-
-_DIGITS = 4  # of places that the user sets by hand
-_LEAST_APART = 0.01  # of two in-betweens, one of which the user asks for
 
 
 @dataclass(frozen=True)
@@ -63,10 +61,7 @@ class Plan:
 
     def locate(self) -> bpy.types.Object | None:
         """The object, even if it was renamed or changed; None if it was deleted."""
-        obj = bpy.data.objects.get(self.object_name)
-        if obj is not None and obj.session_uid == self.object_id:
-            return obj
-        return next((obj for obj in bpy.data.objects if obj.session_uid == self.object_id), None)
+        return located(self.object_name, self.object_id)
 
     def find_object(self) -> bpy.types.Object:
         """The object, after checking that the outcome can still be written to it.
@@ -88,6 +83,14 @@ class Plan:
         if not all(_same(pair, self.task.pairs[ends]) for ends, pair in pairs.items()):
             raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. Bake again.")
         return obj
+
+
+def located(name: str, session_uid: int) -> bpy.types.Object | None:
+    """The object that once had this name, even if it was renamed or changed; None if it was deleted."""
+    obj = bpy.data.objects.get(name)
+    if obj is not None and obj.session_uid == session_uid:
+        return obj
+    return next((obj for obj in bpy.data.objects if obj.session_uid == session_uid), None)
 
 
 def plan_maps(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
@@ -150,60 +153,6 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     return Plan(request, task, obj.session_uid, obj.name, tuple(notes))
 
 
-def request_again(obj: bpy.types.Object | None, chain: Chain) -> BakeRequest:
-    """The request that a chain was baked with, to bake it again.
-
-    Raises
-    ------
-    InputError
-        If the object cannot be used, or keys that the chain goes through no longer exist.
-    """
-    problem = checks.chain_problem(keys_of(checks.require_object(obj)), chain)
-    if problem is not None:
-        raise InputError(problem)
-    return BakeRequest.again(chain.through, chain.request)
-
-
-def plan_one_more(obj: bpy.types.Object | None, chain: Chain) -> Plan:
-    """Plan a chain again with one more in-between, where its control is now; later bakes of it have it too.
-
-    Raises
-    ------
-    InputError
-        If the object or the keys cannot be used, or the control is not between two in-betweens.
-    """
-    request = request_again(obj, chain)
-    control = chain_keys.control_of(checks.require_object(obj), chain)
-    control.require()
-    place = round(control.value, _DIGITS)
-    if not 0.0 < place < 1.0:
-        raise InputError(f"'{control.name}' is at {place:.2f}; set it between 0 and 1, where the in-between is to be.")
-    nearest = min(chain.places, key=lambda known: abs(known - place))
-    if abs(nearest - place) < _LEAST_APART:
-        what = "an end" if nearest in (0.0, 1.0) else "an in-between"
-        raise InputError(f"'{control.name}' is at {place:.3f}, and there is {what} at {nearest:.3f}; set it elsewhere.")
-    return plan_bake(obj, replace(request, also_at=(*request.also_at, place)))
-
-
-def plan_preview(obj: bpy.types.Object | None, chain: Chain) -> Plan:
-    """Plan the frames of a baked chain for live scrub: densely and evenly spaced, without easing.
-
-    Raises
-    ------
-    InputError
-        If the object or the keys can no longer be used.
-    """
-    from ...solver.frames.key_times import KeyTimes
-
-    request = request_again(obj, chain)
-    chain_keys.control_of(checks.require_object(obj), chain).require()
-    plan = plan_bake(obj, request)
-    key_times = KeyTimes.of(request.frame_options, len(request.keys) - 1).before_easing
-    even = replace(request.frame_options, easing="linear", via_at=tuple(key_times.at[1:-1].tolist()))
-    times = key_times.between(PREVIEW_STEPS - 1)
-    return replace(plan, task=replace(plan.task, frame_options=even, times=times, play=None))
-
-
 def write_maps(plan: Plan, outcome: Outcome) -> None:
     """Store the maps with the object's keys, for later bakes.
 
@@ -258,6 +207,8 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         notes += colliders.changed_since(obj, request.colliders, request.keys, plan.task.collider)
         notes += double_motion(obj, chain, record.chains)
         notes += unknown
+        left = sentence(leftovers(keys, {*made_keys(keys), *chain.keys.values()}))
+        notes += [left] if left else []
         if obj.show_only_shape_key:
             notes.append(f"'{obj.name}' shows only its active key; unpin it to see the in-betweens play.")
         report = {
@@ -276,7 +227,7 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         }
         chain.request, chain.mirror_of = request.remembered(), ""
         chain.digests = tuple(digest(keys.key_blocks[name]) for name in request.keys)
-        chain.result = Summary.of_report(bake.report, steps.places, notes)
+        chain.result = Summary.of_report(bake.report, steps.places, len(request.keys), notes)
         record.chains.append(record.chains.pop(record.chains.index(chain)))  # the newest is the last
         _keep_maps(keys, record, plan, outcome, undo)
         bookkeeping.remember(obj, record, chain, bake.measures, made, undo)

@@ -16,14 +16,13 @@ from ...solver.errors import InputError
 from .. import native_files
 from ..kinds import keys_of, mesh_of
 from ..store import checks
-from .many import Verdict, bake_keys, bakeable_keys
-from .plan import Plan, plan_bake, write_bake
+from .many import Verdict, bakeable_keys, plan_keys
+from .plan import plan_bake, write_bake
 from .request import BakeRequest, BakeResult
 from .together import plan_together, write_together
 
 if TYPE_CHECKING:
-    from ...solver.frames.task import Outcome
-    from ...solver.support.progress import Progress
+    from ...solver.support.progress import Done, Progress
 
 # Estimate of the saved file's size, without its shape keys: this many times that of the opened one, which may be
 # compressed.
@@ -83,9 +82,12 @@ def bake_objects_together(
 
 
 def bake_object_keys(
-    obj: bpy.types.Object, names: Sequence[str], choices: BakeRequest, on_progress: OnProgress | None = None
+    obj: bpy.types.Object,
+    names: Sequence[str],
+    choices: BakeRequest,
+    on_progress: Callable[[Done], object] | None = None,
 ) -> list[Verdict]:
-    """Bake keys of an object in this process, each played by its own value.
+    """Bake keys of an object in one run in this process, each played by its own value.
 
     Parameters
     ----------
@@ -99,15 +101,10 @@ def bake_object_keys(
     QC3DError
         If the object or a name cannot be used. A key that cannot be baked raises nothing; its verdict says so.
     """
-    from ...solver.frames.task import carry_out
     from ...solver.support.memory import machine_limit_mb
-    from ...solver.support.progress import finish
 
-    def work(plan: Plan, number: int) -> Outcome:
-        plan.task.require_memory(machine_limit_mb())
-        return finish(carry_out(plan.task), on_progress)
-
-    return bake_keys(obj, names or bakeable_keys(obj), choices, work)
+    plan = plan_keys(obj, names or bakeable_keys(obj), choices, machine_limit_mb())
+    return plan.write(plan.task.outcomes(on_progress))
 
 
 def bake_file(

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import bpy
 
 from ...solver.errors import InputError
+from ..keys.leftovers import leftovers
 from ..kinds import shape_keys_of
 from ..store import combined_keys
 from ..store.records import Chain, Record
@@ -51,7 +52,8 @@ def sculpted_between(obj: bpy.types.Object, last: str) -> dict[str, float]:
     keys = shape_keys_of(obj) if obj.type == 'MESH' else None
     if keys is None or not last:
         return {}
-    made = made_keys(keys)
+    recorded = made_keys(keys)
+    made = {*recorded, *leftovers(keys, recorded)}
     places: dict[float, str] = {}
     for key in keys.key_blocks:
         if key.name.startswith(last) and key.name not in made:

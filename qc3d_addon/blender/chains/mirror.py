@@ -72,13 +72,13 @@ def mirror_chain(
     sculpted = Sculpted.of(obj, mirrored)
     sculpted.require_among(chain.places)
     shapes, made, _ = sculpted.kept(chain.places, shapes)
-    with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, _):
+    with shape_keys.chain_written(obj, mirrored, shapes, places, None) as (undo, said):
         mirrored.request, mirrored.mirror_of = chain.request, chain.slider
         mirrored.result = _mirrored_result(chain.result, partners)
         if measures is not None:
             measures = {name: values[:, partners] for name, values in measures.items()}
         bookkeeping.remember(obj, record, mirrored, measures, made, undo)
-    return mirrored, notes
+    return mirrored, [*notes, *said]
 
 
 def _require_mirror_image(

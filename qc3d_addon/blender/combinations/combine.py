@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import product
@@ -16,23 +16,25 @@ import numpy as np
 from ...solver.arrays import Floats
 from ...solver.errors import InputError
 from .. import compat
+from ..bake.plan import located
 from ..keys import shape_keys
 from ..keys.control import mute_path, value_path
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys, names
 from ..store.combined_keys import Combined
 from ..store.mesh_data import key_coordinates, set_key_coordinates
-from .halves import MirroredShapes
+from .halves import completed
 from .probe import probed
 
 if TYPE_CHECKING:
+    from ...solver.combinations.corrections import Corrected, Corrections
+    from ...solver.combinations.mirrored import MirroredShapes
     from ...solver.settings import FitOptions
+    from ...solver.support.progress import Progress
 
 # A correction is close to the product of the values: parabolas through these follow it, and need a key for each pair.
 PLACES = (0.5, 1.0)
 _MOST_KEYS = 3
-# Of the size: what is less than this of a difference between the sum and what the keys show is rounding.
-_ROUNDING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -66,13 +68,61 @@ class Made:
         )
 
 
-def combine(
+@dataclass(frozen=True)
+class CombinationPlan:
+    """What to compute for keys that are on at once, and what to compare when it is written.
+
+    Parameters
+    ----------
+    chosen : tuple of str
+        Names of the keys.
+    task : Corrections
+    mesh : MirroredShapes
+        The mesh whose shapes are computed.
+    shown : list of (n, 3)
+        What the keys show now for each combination of values of the task.
+    object_id, object_name
+        See ``bake.plan.Plan``.
+    digests : tuple of str
+        Of the base and the keys, as they are now.
+    """
+
+    chosen: tuple[str, ...]
+    task: Corrections
+    mesh: MirroredShapes
+    shown: list[Floats]
+    object_id: int
+    object_name: str
+    digests: tuple[str, ...]
+
+    def find_object(self) -> bpy.types.Object:
+        """The object, after checking that the outcome can still be written to it.
+
+        Raises
+        ------
+        InputError
+            If it was deleted, is being edited, or its keys have changed since the plan was made.
+        """
+        obj = located(self.object_name, self.object_id)
+        if obj is None:
+            raise InputError(f"'{self.object_name}' was deleted meanwhile; nothing was written.")
+        checks.require_object(obj)
+        try:
+            _require(obj, self.chosen)
+        except InputError as error:
+            raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. {error}") from error
+        if combined_keys.digests_of(keys_of(obj), self.chosen) != self.digests:
+            raise InputError(f"'{obj.name}' was changed meanwhile; nothing was written. Combine again.")
+        return obj
+
+
+def plan_combination(
     obj: bpy.types.Object | None,
     chosen: Sequence[str],
     find_order: bool = True,
     options: FitOptions | None = None,
-) -> Iterator[float | Made]:
-    """Make the correction keys for some keys of an object, in steps that can be stopped.
+) -> CombinationPlan:
+    """Plan the correction keys for some keys of an object.
 
     The keys themselves, their in-betweens, and a key that the user has sculpted for their combination stay as they are.
     If there is such a key, the corrections lead to it.
@@ -87,85 +137,87 @@ def combine(
     options
         Options of the fit that keeps shapes from crossing themselves.
 
-    Yields
-    ------
-    The part that is done, and at last what was made. Nothing is written before that.
-
     Raises
     ------
     InputError
         If the keys cannot be combined, or one that would be written is locked.
     """
     # Imported where it is used: scipy would make Blender start slower.
-    from ...solver.combinations.base import KeysOnBase
-    from ...solver.combinations.combine import together
-    from ...solver.combinations.composer import Composer
-    from ...solver.combinations.order import outermost_first
+    from ...solver.combinations.corrections import Corrections
     from ...solver.settings import FitOptions
-    from ...solver.support.progress import finish
 
     obj = checks.require_object(obj)
     keys = keys_of(obj)
     _require(obj, chosen)
     known = combined_keys.read(keys)
     made = {name for one in known for name, _ in one.made}
-    earlier = next((one for one in known if set(one.keys) == set(chosen)), None)
-    own = {name for name, _ in earlier.made} if earlier is not None else set()
+    own = {name for name, _ in earlier.made} if (earlier := _earlier(known, chosen)) is not None else set()
     _require_unlocked(keys, own)
-    grid = list(product(PLACES, repeat=len(chosen)))
+    count = len(chosen)
+    grid = np.array(list(product(range(len(PLACES)), repeat=count)))
+    values = np.array(PLACES)
     with probed(obj, chosen, made) as shown:
-        asked = {
-            (number, place): shown([place * (number == other) for other in range(len(chosen))])
-            for number in range(len(chosen))
-            for place in PLACES
-        }
-        ends = shown([0.0] * len(chosen)), shown([1.0] * len(chosen))
+        alone = [shown((place * np.eye(count)[key]).tolist()) for key in range(count) for place in PLACES]
+        ends = shown([0.0] * count), shown([1.0] * count)
     with probed(obj, chosen, own) as shown:
-        present = {places: shown(places) for places in grid}
-    mesh = MirroredShapes(obj, [*ends, *asked.values()])
+        present = [shown(values[places].tolist()) for places in grid]
+    mesh = completed(obj, [*ends, *alone])
     base, sculpted, *others = mesh.shapes
-    alone = dict(zip(asked, others, strict=True))
-    together_keys = KeysOnBase(base, [alone[number, 1.0] for number in range(len(chosen))], mesh.faces, mesh.edges)
-    order = outermost_first(together_keys) if find_order else tuple(range(len(chosen)))
-    composer = Composer(together_keys)
-    size = together_keys.diagonal
-    whole = [alone[number, 1.0] for number in order]
-    total = base + sum(shape - base for shape in whole)
-    is_sculpted = bool(np.linalg.norm(sculpted - total, axis=1).max() > _ROUNDING * size)
-    yield 0.0
-    wanted, crossings = {}, 0
-    beside, turned = None, None
-    if is_sculpted:
-        beside, turned = sculpted - composer.composed(whole), composer.turns(whole)
-    for number, places in enumerate(grid):
-        on = [alone[key, places[key]] for key in order]
-        if beside is None or turned is None:
-            wanted[places], crossed = finish(together(together_keys, on, options or FitOptions(), composer))
-            crossings = max(crossings, crossed or 0)
-        elif min(places) == 1.0:
-            wanted[places] = sculpted
-        else:
-            # What the user sculpted beside the computed shape, as far as the keys are on, turned with what it is on.
-            turn = composer.turns(on) @ turned.transpose(0, 2, 1)
-            wanted[places] = composer.composed(on) + np.prod(places) * np.einsum("nij,nj->ni", turn, beside)
-        yield (number + 1) / len(grid)
-    named = tuple(chosen[number] for number in order)
-    corrections = {
-        tuple(places[number] for number in order): mesh.own(wanted[places]) - present[places]
-        for places in grid
-        if not (is_sculpted and min(places) == 1.0)
-    }
-    corrections = dict(sorted(corrections.items()))
-    off = float(np.linalg.norm(wanted[grid[-1]] - total, axis=1).max()) / size
-    combined = _write(obj, named, corrections, earlier, known)
-    yield Made(combined, is_sculpted, crossings, off)
+    shapes = np.stack(others).reshape(count, len(PLACES), *base.shape)
+    task = Corrections(
+        base, shapes, sculpted, grid, values, mesh.faces, mesh.edges, find_order, options or FitOptions()
+    )
+    digests = combined_keys.digests_of(keys, chosen)
+    return CombinationPlan(tuple(chosen), task, mesh, present, obj.session_uid, obj.name, digests)
 
 
-def finished(steps: Iterator[float | Made]) -> Made:
-    """Run ``combine`` to its end."""
-    *_, made = steps
-    assert isinstance(made, Made)
-    return made
+def write_combination(plan: CombinationPlan, corrected: Corrected) -> Made:
+    """Write the correction keys: all of them or, if anything fails, none.
+
+    Raises
+    ------
+    InputError
+        If the object was deleted or changed during the work, or a key that would be written is locked.
+    """
+    obj = plan.find_object()
+    keys = keys_of(obj)
+    known = combined_keys.read(keys)
+    earlier = _earlier(known, plan.chosen)
+    _require_unlocked(keys, {name for name, _ in earlier.made} if earlier is not None else set())
+    corrections = {}
+    for places, shape, shown in zip(plan.task.places, corrected.shapes, plan.shown, strict=True):
+        values = tuple(float(plan.task.values[places[key]]) for key in corrected.order)
+        if not (corrected.is_sculpted and min(values) == 1.0):
+            corrections[values] = plan.mesh.own(shape) - shown
+    named = tuple(plan.chosen[number] for number in corrected.order)
+    combined = _write(obj, named, dict(sorted(corrections.items())), earlier, known)
+    return Made(combined, corrected.is_sculpted, corrected.crossings, corrected.off)
+
+
+def combine(
+    obj: bpy.types.Object | None,
+    chosen: Sequence[str],
+    find_order: bool = True,
+    options: FitOptions | None = None,
+    on_progress: Callable[[Progress], object] | None = None,
+) -> Made:
+    """Plan, compute and write the correction keys in this process; see ``plan_combination``.
+
+    Raises
+    ------
+    InputError
+        If the keys cannot be combined, or one that would be written is locked; nothing is written then.
+    """
+    from ...solver.support.memory import machine_limit_mb
+    from ...solver.support.progress import finish
+
+    plan = plan_combination(obj, chosen, find_order, options)
+    plan.task.require_memory(machine_limit_mb())
+    return write_combination(plan, finish(plan.task.carried_out(), on_progress))
+
+
+def _earlier(known: Sequence[Combined], chosen: Sequence[str]) -> Combined | None:
+    return next((one for one in known if set(one.keys) == set(chosen)), None)
 
 
 def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
@@ -231,7 +283,7 @@ def _write(
             set_key_coordinates(key, (start + correction).astype(np.float32))
             _drive(keys, key, named, places)
             made.append((key.name, places))
-        combined = Combined(named, tuple(made))
+        combined = Combined(named, tuple(made), combined_keys.digests_of(keys, named))
         others = [one for one in known if one is not earlier]
         combined_keys.write(keys, [*others, combined], undo)
         undo.pop_all()

@@ -21,6 +21,7 @@ from ..store import checks
 from ..store.records import Chain, Record
 from . import fbx_files, gltf_files, usd_files
 from .in_betweens import InBetweens
+from .stand_ins import playing_keys
 
 # In-betweens per key in USD and FBX. Programs that read them interpolate linearly, and with so many, straight lines
 # miss a rotation by 90 degrees by 0.2 % of the radius.
@@ -40,7 +41,7 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     Parameters
     ----------
     obj
-        A mesh object with in-betweens that are played by the values of keys.
+        A mesh object with in-betweens. Those that a slider plays become in-betweens of a key named as the slider.
     path
         The file; its extension chooses the format: .usda, .usdc or .usd, .fbx, .glb.
     density
@@ -62,44 +63,57 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     if suffix not in SUFFIXES:
         raise InputError(f"{path.name} has none of the extensions {', '.join(SUFFIXES)}; choose one of them.")
     require_writable(path)
-    names = [key.name for key in keys_of(obj).key_blocks[1:]]
     # Beside its place: exporters write the paths of images relative to the file's own folder.
-    size = 12 * len(mesh_of(obj).vertices) * (len(names) + (density + 1) * len(chains))
+    size = 12 * len(mesh_of(obj).vertices) * (len(keys_of(obj).key_blocks) + (density + 1) * len(chains))
     with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
         native_files.require_short(unfinished, path)
         if suffix == ".glb":
             return _export_gltf(obj, chains, unfinished, path, size)
-        found = [in_betweens(obj, chain, density) for chain in chains]
-        if suffix == ".fbx":
-            _called(
-                lambda: bpy.ops.export_scene.fbx(
-                    filepath=str(unfinished),
-                    use_selection=True,
-                    bake_anim_use_nla_strips=False,
-                    bake_anim_use_all_actions=False,
-                    bake_anim_simplify_factor=0.0,
-                    use_mesh_modifiers=False,
-                ),
-                unfinished,
-                path,
-                size,
-            )
-            fbx_files.add_in_betweens(unfinished, mesh_of(obj).name, found)
-        else:
-            _called(
-                lambda: bpy.ops.wm.usd_export(
-                    filepath=str(unfinished), selected_objects_only=True, export_animation=True, export_shapekeys=True
-                ),
-                unfinished,
-                path,
-                size,
-            )
-            usd_files.add_in_betweens(unfinished, names, len(mesh_of(obj).vertices), found)
+        with playing_keys(obj, chains) as playing:
+            found = [in_betweens(obj, chain, density, key) for chain, key in zip(chains, playing, strict=True)]
+            _export_in_betweens(obj, found, unfinished, path, size)
     return []
 
 
-def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens:
+def _export_in_betweens(
+    obj: bpy.types.Object, found: list[InBetweens], unfinished: Path, path: Path, size: int
+) -> None:
+    """Export the keys as shapes, and add their in-betweens."""
+    if path.suffix.lower() == ".fbx":
+        _called(
+            lambda: bpy.ops.export_scene.fbx(
+                filepath=str(unfinished),
+                use_selection=True,
+                bake_anim_use_nla_strips=False,
+                bake_anim_use_all_actions=False,
+                bake_anim_simplify_factor=0.0,
+                use_mesh_modifiers=False,
+            ),
+            unfinished,
+            path,
+            size,
+        )
+        fbx_files.add_in_betweens(unfinished, mesh_of(obj).name, found)
+        return
+    _called(
+        lambda: bpy.ops.wm.usd_export(
+            filepath=str(unfinished), selected_objects_only=True, export_animation=True, export_shapekeys=True
+        ),
+        unfinished,
+        path,
+        size,
+    )
+    names = [key.name for key in keys_of(obj).key_blocks[1:]]
+    usd_files.add_in_betweens(unfinished, names, len(mesh_of(obj).vertices), found)
+
+
+def in_betweens(obj: bpy.types.Object, chain: Chain, density: int, key: str) -> InBetweens:
     """``density`` evenly spaced shapes that a key plays between 0 and 1, including what was sculpted since.
+
+    Parameters
+    ----------
+    key
+        Name of the key that plays the chain by its value, or stands in for its slider.
 
     Raises
     ------
@@ -110,17 +124,13 @@ def in_betweens(obj: bpy.types.Object, chain: Chain, density: int) -> InBetweens
     shapes = chain_shapes.step_shapes(obj, chain)
     played = chain.weights.played(shapes, places)
     made = frozenset(key.name for key in chain_keys.owned_keys(keys_of(obj), chain).values())
-    return InBetweens(chain.on_key, made, places, played - shapes[0])
+    return InBetweens(key, made, places, played - shapes[0])
 
 
 def _chains(obj: bpy.types.Object) -> list[Chain]:
-    """The chains that keys of the object play by their own values."""
-    chains = [chain for chain in Record.read(keys_of(obj)).chains if chain.on_key]
+    chains = Record.read(keys_of(obj)).chains
     if not chains:
-        raise InputError(
-            f"'{obj.name}' has no in-betweens that a key plays by its own value, as other programs need; bake some "
-            "with Play On set to Key."
-        )
+        raise InputError(f"'{obj.name}' has no in-betweens; bake some first.")
     return chains
 
 
@@ -140,8 +150,8 @@ def _export_gltf(
     seconds = frames * (render.fps_base / render.fps)
     gltf_files.set_weight_animation(unfinished, obj.name, names, seconds, values)
     return [
-        f"'{chain.on_key}' has {len(chain.keys)} in-betweens; some programs support only {_MOST_TARGETS} morph "
-        "targets, so re-bake it with fewer."
+        f"'{chain.on_key or chain.slider}' has {len(chain.keys)} in-betweens; some programs support only "
+        f"{_MOST_TARGETS} morph targets, so re-bake it with fewer."
         for chain in chains
         if len(chain.keys) > _MOST_TARGETS
     ]

@@ -66,6 +66,15 @@ def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
     return Control(obj, chain.slider)
 
 
+def original_of(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object | None:
+    """The object whose slider the drivers of a copy still read, as after a script copied it; otherwise None."""
+    for driver in _drivers(keys_of(obj), chain) if not chain.on_key else ():
+        owner = driver.variables[0].targets[0].id
+        if isinstance(owner, bpy.types.Object) and owner != obj and is_original(obj, owner, chain):
+            return owner
+    return None
+
+
 def is_original(obj: bpy.types.Object, owner: bpy.types.Object, chain: Chain) -> bool:
     """Whether ``obj`` is a copy of ``owner``: a script copies the slider too, but the drivers read the original."""
     return owner.type == 'MESH' and owner.data != obj.data and has(owner, chain.slider) and has(obj, chain.slider)

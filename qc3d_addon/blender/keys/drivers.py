@@ -143,7 +143,7 @@ def paths_read(keys: bpy.types.Key) -> Counter[str]:
 def all_drivers() -> Iterator[bpy.types.FCurve]:
     """All drivers of the file, except those of data blocks without users, which are not saved."""
     for collection in bpy.data.bl_rna.properties:
-        if collection.type != 'COLLECTION':
+        if collection.type != 'COLLECTION' or collection.identifier == 'all_ids':  # which has all others again
             continue
         for block in getattr(bpy.data, collection.identifier):
             owner = block.user if isinstance(block, bpy.types.Key) else block

@@ -13,9 +13,10 @@ import numpy as np
 from ...solver.errors import InputError
 from ..kinds import keys_of, mesh_of
 from ..store import kept_shapes
+from ..store.chain_values import LEAST_DISTANCE
 from ..store.kept_shapes import Shape, Shapes
 from ..store.mesh_data import key_coordinates
-from ..store.records import LEAST_DISTANCE, Chain
+from ..store.records import Chain
 from .chain_keys import base_key, owned_keys
 
 T = TypeVar("T")
@@ -41,10 +42,13 @@ class Sculpted:
         By place.
     before
         Shapes that the previous bake wrote, by place; empty if they are unknown.
+    note
+        A sentence if what was sculpted cannot be told from what was made; otherwise empty.
     """
 
     held: dict[float, Held]
     before: Shapes
+    note: str = ""
 
     @classmethod
     def of(cls, obj: bpy.types.Object, chain: Chain) -> Sculpted:
@@ -61,7 +65,14 @@ class Sculpted:
             correction = np.zeros_like(current) if written is None else _moved(current, written, base, base_before)
             if key.lock_shape or correction.any():
                 held[place] = Held(key.name, current, correction, key.lock_shape)
-        return cls(held, before)
+        count, known = len(base), kept_shapes.vertices_before(keys, chain.slider) if owned else None
+        note = ""
+        if known not in (None, count):
+            note = (
+                f"The mesh has {count} vertices, and had {known} at the earlier bake, so what was sculpted into the "
+                "in-betweens could not be told apart. They were made anew, except locked ones."
+            )
+        return cls(held, before, note)
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -78,7 +89,7 @@ class Sculpted:
 
     def kept(self, places: tuple[float, ...], shapes: dict[int, Shape]) -> tuple[dict[int, Shape], Shapes, list[str]]:
         """The shapes to write, by step; those to remember, by place; and sentences about what was kept."""
-        written, remembered, sentences = {}, {}, []
+        written, remembered, sentences = {}, {}, [self.note] if self.note else []
         for step, shape in shapes.items():
             held = _at(self.held, places[step])
             written[step], remembered[places[step]] = shape, shape

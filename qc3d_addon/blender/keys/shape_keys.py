@@ -16,14 +16,18 @@ from ...solver.errors import InputError
 from .. import compat
 from ..kinds import keys_of
 from ..store import names
+from ..store.chain_values import LEAST_DISTANCE, keyframe_values
 from ..store.mesh_data import key_coordinates, set_key_coordinates
-from ..store.records import LEAST_DISTANCE, Chain, keyframe_values
+from ..store.records import Chain
 from . import drivers, slider
 from .chain_keys import base_key, control_of, owned_keys
-from .control import Control, key_path
+from .control import Control, key_path, value_path
 
 if TYPE_CHECKING:
     from ...solver.frames.weights import Weights
+
+
+RANGE = (-10.0, 10.0)  # of made keys: Blender's maximum
 
 
 class Steps(NamedTuple):
@@ -154,6 +158,7 @@ def chain_written(
         if keyframes is not None:
             wanted = keyframe_values(keyframes, via_at)
             curve, notes = slider.begin_keyframes(control, chain, wanted, undo)
+        notes = [*notes, *_staying(keys, stale)[1]]  # before the notes are stored; they are removed afterward
         chain.keys = {step: written[step].name for step in sorted(written)}
         chain.keyframes = chain.keyframes if curve is None else keyframes
         yield undo, notes
@@ -192,23 +197,35 @@ def remove_keys(obj: bpy.types.Object, stale: list[bpy.types.ShapeKey]) -> list[
     Returns
     -------
     list of str
-        Sentences about keys that stay, with value 0, because drivers of the user read them.
+        Sentences about keys that stay, with value 0, because drivers of the user read them, and about keyframes of the
+        others.
     """
     active = None if obj.active_shape_key in stale else obj.active_shape_key
-    notes = []
-    read = drivers.paths_read(keys_of(obj)) if stale else {}
+    staying, notes = _staying(keys_of(obj), stale)
     for key in stale:
-        readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
-        if readers:
+        if key.name in staying:
             drivers.undrive(key)
-            key.value = 0.0
-            what = "driver reads" if readers == 1 else "drivers read"
-            notes.append(f"Key '{key.name}' stays, with value 0, since {readers} {what} it.")
+            key.value, key.slider_min, key.slider_max = 0.0, 0.0, 1.0  # an ordinary key of the user
         else:
             _remove_key(obj, key)
     _activate(obj, active)
     keys_of(obj).update_tag()
     return notes
+
+
+def _staying(keys: bpy.types.Key, stale: list[bpy.types.ShapeKey]) -> tuple[set[str], list[str]]:
+    """Which of these keys stay when they are removed, and sentences about them and about keyframes without a key."""
+    staying, notes = set(), []
+    read = drivers.paths_read(keys) if stale else {}
+    for key in stale:
+        readers = sum(count for path, count in read.items() if path.startswith(key_path(key.name)))
+        if readers:
+            staying.add(key.name)
+            what = "driver reads" if readers == 1 else "drivers read"
+            notes.append(f"Key '{key.name}' stays, with value 0, since {readers} {what} it.")
+        elif compat.is_animated(keys, value_path(key.name)):
+            notes.append(f"The keyframes of '{key.name}', which is gone, stay in the action without effect.")
+    return staying, notes
 
 
 def remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:
@@ -230,7 +247,7 @@ def new_key(obj: bpy.types.Object, name: str, base: bpy.types.ShapeKey, undo: Ex
 
 def _widen(key: bpy.types.ShapeKey) -> None:
     """Widen a key's range to Blender's maximum: smooth weights exceed [0, 1]."""
-    key.slider_min, key.slider_max = -10.0, 10.0
+    key.slider_min, key.slider_max = RANGE
 
 
 def _remove_key(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> None:

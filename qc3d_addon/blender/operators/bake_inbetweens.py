@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
-from ..bake.plan import Plan, plan_bake, plan_one_more, request_again, write_bake
+from ..bake.plan import Plan, plan_bake, write_bake
+from ..bake.plan_again import plan_one_more, request_again
 from ..bake.together import objects_with_keys, plan_together, write_together
 from ..choices import TimedChoices
 from ..kinds import present
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
 
-class QC3D_OT_bake_inbetweens(TimedChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_bake_inbetweens(TimedChoices, ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Fill in the frames between two or more shape keys: new shape keys, all played by one slider or key"""
 
     bl_idname = "qc3d.bake_inbetweens"
@@ -42,7 +43,7 @@ class QC3D_OT_bake_inbetweens(TimedChoices, ChildWork, bpy.types.Operator):
         return _written(plan, outcome)
 
 
-class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
+class QC3D_OT_rebake(ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Bake these in-betweens again with the same options, after their keys were sculpted; slider and drivers stay"""
 
     bl_idname = "qc3d.rebake"
@@ -63,7 +64,7 @@ class QC3D_OT_rebake(ChildWork, bpy.types.Operator):
         return _written(plan, outcome)
 
 
-class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
+class QC3D_OT_add_here(ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Bake again with one more in-between, at the value that the slider or key has now"""
 
     bl_idname = "qc3d.add_here"
@@ -83,7 +84,7 @@ class QC3D_OT_add_here(ChildWork, bpy.types.Operator):
         return _written(plan, outcome)
 
 
-class QC3D_OT_bake_objects(TimedChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_bake_objects(TimedChoices, ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Bake the selected objects that have these shape keys together, so that lashes stay on lids and clothes on skin"""
 
     bl_idname = "qc3d.bake_objects"

@@ -4,16 +4,18 @@
 
 # Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
-from typing import TYPE_CHECKING, Union
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty
 
-from ...solver.errors import QC3DError
-from ..bake.many import Verdict, bakeable_keys, plan_key, require_own_keys, summary, write_key
-from ..bake.plan import Plan
+from ...solver.errors import CanceledError, QC3DError
+from ..bake.jobs import Job
+from ..bake.many import ManyPlan, bakeable_keys, plan_keys, summary
 from ..choices import BakeChoices, InnerKey
 from ..kinds import keys_of, present
+from ..preferences import limits
 from ..properties import bake_request, fill_from_panel, settings_of, show_newest
 from ..store import checks
 from .child_work import ChildWork
@@ -32,7 +34,7 @@ class KeyChoice(bpy.types.PropertyGroup):
         use: BoolProperty(name="Bake", description="Bake in-betweens on this key", default=True)
 
 
-class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_bake_keys(BakeChoices, ChildWork[ManyPlan, "Sequence[Outcome | QC3DError]"], bpy.types.Operator):
     """Bake in-betweens for many shape keys at once, each played by its own value; keys that need none are skipped"""
 
     bl_idname = "qc3d.bake_keys"
@@ -85,40 +87,22 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork, bpy.types.Operator):
             return self._guarded(context, lambda: self._begin(context, self.plan(context)))
         return super().execute(context)
 
-    @property
-    def part(self) -> tuple[int, int]:
-        return (self._number, max(len(self._names), 1))
-
-    def plan(self, context: bpy.types.Context) -> Plan | None:
+    def plan(self, context: bpy.types.Context) -> ManyPlan:
         obj = checks.require_object(context.active_object)
         fill_from_panel(self.properties, settings_of(obj))
-        self._choices = bake_request(self, ("", ""))
-        self._names = require_own_keys(obj, self._chosen(obj))
-        self._number = -1
-        self._done: list[tuple[Plan, Outcome | QC3DError] | Verdict] = []
-        return self._next(context)
+        return plan_keys(obj, self._chosen(obj), bake_request(self, ("", "")), limits(context).memory_mb)
 
-    def following(
-        self, context: bpy.types.Context, plan: Plan, outcome: Union["Outcome", QC3DError]
-    ) -> Plan | None:
-        self._done.append((plan, outcome))
-        return self._next(context)
-
-    def write_all(self, plan: Plan | None, outcome: Union["Outcome", QC3DError, None]) -> list[str]:
+    def write(self, plan: ManyPlan, outcome: "Sequence[Outcome | QC3DError]") -> list[str]:
         end_previews()
-        verdicts = [one if isinstance(one, Verdict) else write_key(*one) for one in self._done]
-        show_newest(plan.locate() if plan is not None else None)
+        verdicts = plan.write(outcome)
+        show_newest(plan.locate())
         return [*map(str, verdicts), summary(verdicts)]
 
-    def _next(self, context: bpy.types.Context) -> Plan | None:
-        """The plan of the next key that has one."""
-        for number in range(self._number + 1, len(self._names)):
-            self._number = number
-            plan = plan_key(context.active_object, self._names[number], self._choices)
-            if not isinstance(plan, Verdict):
-                return plan
-            self._done.append(plan)
-        return None
+    def write_done(self, plan: ManyPlan, job: Job) -> list[str]:
+        outcomes = job.outcomes(CanceledError("was not reached before the bake was canceled"))
+        if all(isinstance(outcome, CanceledError) for outcome in outcomes):
+            return []
+        return self.write(plan, outcomes)
 
     def _chosen(self, obj: bpy.types.Object) -> list[str]:
         if self.which == "named" or (self.which == "selected" and len(self.keys)):

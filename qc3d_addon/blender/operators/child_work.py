@@ -6,59 +6,65 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, cast
 
 import bpy
 
 from ...solver.errors import QC3DError
 from .. import compat, preferences
 from ..bake import jobs, progress_bar
-from ..bake.plan import Plan
 from ..kinds import present
 from .common import OperatorMixin, Status, report_error
 
 if TYPE_CHECKING:
-    from ...solver.frames.task import Outcome
-    from ...solver.support.progress import Progress
+    from ...worker.client import Job
+
+    class HasTask(Protocol):
+        """What an operator plans."""
+
+        @property
+        def task(self) -> Job:
+            """What to compute."""
+
+    Planned = TypeVar("Planned", bound=HasTask)
+    Made = TypeVar("Made")
+
+    class Typed(OperatorMixin, Generic[Planned, Made]):
+        """For mypy only: Python keeps the types of a generic class alive, and Blender 4.5 then hangs when it exits."""
+else:
+    Planned = Made = None
+
+    class Typed(OperatorMixin):
+        """Takes the types that mypy reads, and is the same class with all of them."""
+
+        def __class_getitem__(cls, types: object) -> type:
+            return cls
+
 
 _TICK = 0.05  # seconds between looks at the child process
 
 
-class ChildWork(OperatorMixin):
+class ChildWork(Typed[Planned, Made]):
     """Plan the work, run it in a child process, write the outcome.
 
-    An operator defines ``plan`` and ``write``; one with several plans returns the next from ``following`` and writes
-    all outcomes in ``write_all``. Started from a button it is a modal operator, which Esc cancels with the mouse over
-    the progress; called by a script or without a window, it blocks until the end. Nothing is written unless all of
-    the work was done.
+    An operator defines ``plan`` and ``write``. Started from a button it is a modal operator, which Esc cancels with the
+    mouse over the progress; called by a script or without a window, it blocks until the end. Nothing is written unless
+    all of the work was done, or ``write_done`` says otherwise.
     """
 
     bl_options = {'UNDO'}  # without REGISTER: its adjustment panel would run everything again at each change
 
-    def plan(self, context: bpy.types.Context) -> Plan | None:
-        """What to compute, or None if there is nothing to do; raises QC3DError if it is impossible."""
+    def plan(self, context: bpy.types.Context) -> Planned:
+        """What to compute; raises QC3DError if it is impossible."""
         raise NotImplementedError
 
-    def write(self, plan: Plan, outcome: Outcome) -> list[str]:
+    def write(self, plan: Planned, outcome: Made) -> list[str]:
         """Write the outcome into the file; returns sentences for the user, the last of which says what was done."""
         raise NotImplementedError
 
-    @property
-    def part(self) -> tuple[int, int]:
-        """Number of the running plan, from 0, and the number of plans."""
-        return (0, 1)
-
-    def following(self, context: bpy.types.Context, plan: Plan, outcome: Outcome | QC3DError) -> Plan | None:
-        """The next plan, or None after the last."""
-        return None
-
-    def write_all(self, plan: Plan | None, outcome: Outcome | QC3DError | None) -> list[str]:
-        """Write everything into the file after the last plan; raises QC3DError if nothing was written."""
-        if isinstance(outcome, QC3DError):
-            raise outcome
-        assert plan is not None
-        assert outcome is not None
-        return self.write(plan, outcome)
+    def write_done(self, plan: Planned, job: jobs.Job) -> list[str]:
+        """After a cancel, write what was done by then; returns sentences for the user, or none if there was nothing."""
+        return []
 
     def execute(self, context: bpy.types.Context) -> Status:
         from ...worker import client
@@ -68,27 +74,18 @@ class ChildWork(OperatorMixin):
             problem = jobs.busy_problem()
             if problem is not None:
                 raise_input(problem)
-            following = self.plan(context)
-            plan: Plan | None = None
-            outcome: Outcome | QC3DError | None = None
-
-            def show(reached: Progress) -> None:
-                part, parts = self.part
-                manager.progress_update((part + reached.overall) / parts)
-
+            plan = self.plan(context)
             manager.progress_begin(0.0, 1.0)
             try:
-                while following is not None:
-                    plan = following
-                    try:
-                        with compat.interruptible():
-                            outcome = client.run(plan.task, show, preferences.limits(context))
-                    except QC3DError as error:
-                        outcome = error
-                    following = self.following(context, plan, outcome)
+                with compat.interruptible():
+                    outcome = client.run(
+                        plan.task,
+                        lambda reached: manager.progress_update(reached.overall),
+                        preferences.limits(context),
+                    )
             finally:
                 manager.progress_end()
-            return self._finish(self.write_all(plan, outcome))
+            return self._finish(self.write(plan, cast("Made", outcome)))
         except KeyboardInterrupt:
             report_error(self, f"{self.bl_label} was interrupted; nothing was changed.")
             return {'CANCELLED'}
@@ -106,8 +103,7 @@ class ChildWork(OperatorMixin):
         if is_escape and progress_bar.is_at(present(context.window), event.mouse_x, event.mouse_y):
             jobs.cancel()
         if self._job.is_cancelled:
-            self.report({'INFO'}, f"{self.bl_label} was canceled; nothing was changed.")
-            return {'CANCELLED'}
+            return self._guarded(context, self._end_early)
         if event.type != 'TIMER':
             return {'PASS_THROUGH'}
         return self._guarded(context, lambda: self._step(context))
@@ -124,41 +120,35 @@ class ChildWork(OperatorMixin):
             jobs.end()  # otherwise no other job could ever start
             raise
 
-    def _begin(self, context: bpy.types.Context, plan: Plan | None) -> Status:
-        """Start the work of the first plan."""
-        if plan is None:
-            return self._finish(self.write_all(None, None))
+    def _begin(self, context: bpy.types.Context, plan: Planned) -> Status:
+        """Start the work."""
         problem = jobs.busy_problem()
         if problem is not None:
             report_error(self, problem)
             return {'CANCELLED'}
-        self._start(context, plan)
+        self._plan = plan
+        self._job = jobs.begin(self.bl_label, plan.task, preferences.limits(context))
+        timer = present(context.window_manager).event_timer_add(_TICK, window=context.window)
+        self._job.at_end(partial(_leave_window, timer))
         present(context.window_manager).modal_handler_add(self)
         self._show(context)
         return {'RUNNING_MODAL'}
 
-    def _start(self, context: bpy.types.Context, plan: Plan) -> None:
-        self._plan = plan
-        self._job = jobs.begin(self.bl_label, plan.task, preferences.limits(context), *self.part)
-        timer = present(context.window_manager).event_timer_add(_TICK, window=context.window)
-        self._job.at_end(partial(_leave_window, timer))
-
     def _step(self, context: bpy.types.Context) -> Status:
-        """Poll the child process; start the next plan after one, and finish after the last."""
-        outcome: Outcome | QC3DError | None
-        try:
-            outcome = self._job.poll()
-        except QC3DError as error:
-            outcome = error
+        """Poll the child process; write after the end."""
+        outcome = self._job.poll()
         if outcome is None:
             self._show(context)
             return {'PASS_THROUGH'}
         jobs.end()
-        following = self.following(context, self._plan, outcome)
-        if following is None:
-            return self._finish(self.write_all(self._plan, outcome))
-        self._start(context, following)
-        return {'PASS_THROUGH'}
+        return self._finish(self.write(self._plan, cast("Made", outcome)))
+
+    def _end_early(self) -> Status:
+        sentences = self.write_done(self._plan, self._job)
+        if sentences:
+            return self._finish(sentences)
+        self.report({'INFO'}, f"{self.bl_label} was canceled; nothing was changed.")
+        return {'CANCELLED'}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator because the window closes, another file is loaded or the add-on is disabled."""

@@ -15,7 +15,12 @@ from .. import compat
 from ..combinations import combine, verdicts
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys
+from .child_work import ChildWork
 from .common import OperatorMixin, Status, end_previews, poll_active_object, report_error
+
+if TYPE_CHECKING:
+    from ...solver.combinations.corrections import Corrected
+
 
 
 class CombinationWork(OperatorMixin):
@@ -53,12 +58,11 @@ class CombinationWork(OperatorMixin):
         return {'FINISHED'}
 
 
-class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
+class QC3D_OT_combine_keys(ChildWork[combine.CombinationPlan, "Corrected"], bpy.types.Operator):
     """Add keys that correct two or three keys while they are on at once; these keys themselves stay as they are"""
 
     bl_idname = "qc3d.combine_keys"
     bl_label = "Combine Keys"
-    bl_options = {'REGISTER', 'UNDO'}
 
     if TYPE_CHECKING:
         first: str
@@ -76,11 +80,20 @@ class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
             options={'SKIP_SAVE'},
         )
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_active_object(cls, context)
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
-        if self.first and self.second:
-            return self.execute(context)
-        present(context.window_manager).invoke_props_dialog(self)
-        return {'RUNNING_MODAL'}
+        self._asks = not (self.first and self.second) and not bpy.app.background
+        if not self._asks:
+            return super().invoke(context, event)
+        return set(present(context.window_manager).invoke_props_dialog(self))
+
+    def execute(self, context: bpy.types.Context) -> Status:
+        if getattr(self, "_asks", False):  # the dialog was confirmed
+            return self._guarded(context, lambda: self._begin(context, self.plan(context)))
+        return super().execute(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, keys = present(self.layout), keys_of(present(context.active_object))
@@ -88,10 +101,14 @@ class QC3D_OT_combine_keys(CombinationWork, bpy.types.Operator):
             layout.prop_search(self, name, keys, "key_blocks", icon='SHAPEKEY_DATA')
         layout.prop(self, "find_order")
 
-    def work(self, context: bpy.types.Context) -> Iterator[object]:
+    def plan(self, context: bpy.types.Context) -> combine.CombinationPlan:
+        end_previews()
         chosen = [name for name in (self.first, self.second, self.third) if name]
-        for step in combine.combine(context.active_object, chosen, self.find_order):
-            yield step.text if isinstance(step, combine.Made) else step
+        return combine.plan_combination(context.active_object, chosen, self.find_order)
+
+    def write(self, plan: combine.CombinationPlan, outcome: "Corrected") -> list[str]:
+        end_previews()
+        return [combine.write_combination(plan, outcome).text]
 
 
 class QC3D_OT_judge_pairs(CombinationWork, bpy.types.Operator):

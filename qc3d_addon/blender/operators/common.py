@@ -23,14 +23,16 @@ Status = set[Literal['RUNNING_MODAL', 'CANCELLED', 'FINISHED', 'PASS_THROUGH', '
 
 if TYPE_CHECKING:
     SLIDER = str
-    OperatorMixin = bpy.types.Operator  # for mypy only: Blender wants just the final classes to be operators
+    OperatorMixin = bpy.types.Operator  # for mypy only
 else:
     SLIDER = StringProperty(
         name="Slider",
         description="Name of the slider that plays the in-betweens; by default the newest",
         options={'SKIP_SAVE'},
     )
-    OperatorMixin = object
+
+    class OperatorMixin:
+        """Nothing: Blender wants just the final classes to be operators."""
 
 
 _errors: list[str] = []  # the last one that an operator reported since Blender was started

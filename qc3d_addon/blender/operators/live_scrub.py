@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import live_scrub
-from ..bake.plan import Plan, plan_preview
+from ..bake.plan import Plan
+from ..bake.plan_again import plan_preview
 from ..keys import straight
 from ..store import checks
 from .child_work import ChildWork
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
 
-class QC3D_OT_live_scrub(ChildWork, bpy.types.Operator):
+class QC3D_OT_live_scrub(ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Show the exact motion at every position of the slider, not only the baked ones; click again to switch it off"""
 
     bl_idname = "qc3d.live_scrub"

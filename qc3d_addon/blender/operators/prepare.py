@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
 
-class QC3D_OT_prepare(MapChoices, ChildWork, bpy.types.Operator):
+class QC3D_OT_prepare(MapChoices, ChildWork[Plan, "Outcome"], bpy.types.Operator):
     """Compute the map between the shape keys again and keep it, so that later bakes take less time"""
 
     bl_idname = "qc3d.prepare"

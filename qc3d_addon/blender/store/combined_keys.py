@@ -5,17 +5,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import bpy
 
 from ...solver.errors import InputError
 from . import id_properties
 from . import stored_values as stored
+from .renames import digest
 
 PROPERTY = "qc3d_combinations"
 _MOST_KEYS = 4
+_LONGEST_DIGEST = 64
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,13 @@ class Combined:
         Names of the keys, the outermost first.
     made : tuple of (str, tuple of float)
         Names of the correction keys, each with the values of the combined keys at which it is fully on.
+    digests : tuple of str
+        Of the shapes of the base and the keys when they were combined; empty if an earlier version did that.
     """
 
     keys: tuple[str, ...]
     made: tuple[tuple[str, tuple[float, ...]], ...]
+    digests: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, values: object) -> Combined:
@@ -44,7 +50,8 @@ class Combined:
             made.append((stored.name(name), tuple(stored.number(one, 0.0, 1.0) for one in stored.plain_list(places))))
         if not 2 <= len(set(keys)) == len(keys) <= _MOST_KEYS or any(len(places) != len(keys) for _, places in made):
             raise ValueError("not keys that are on at once")
-        return cls(keys, tuple(made))
+        digests = tuple(stored.text(one, _LONGEST_DIGEST) for one in stored.plain_list(found.get("digests", [])))
+        return cls(keys, tuple(made), digests)
 
     @property
     def label(self) -> str:
@@ -70,8 +77,21 @@ def read(keys: bpy.types.Key) -> list[Combined]:
             f"The record of combinations on '{keys.name}' is damaged; delete the custom property '{PROPERTY}' "
             "of the shape keys, whose keys then are yours."
         ) from error
-    there = [Combined(one.keys, tuple(made for made in one.made if is_driven(keys, made[0]))) for one in every]
+    there = [replace(one, made=tuple(made for made in one.made if is_driven(keys, made[0]))) for one in every]
     return [one for one in there if one.made]
+
+
+def digests_of(keys: bpy.types.Key, names: Sequence[str]) -> tuple[str, ...]:
+    """Digests of the shapes of the base of these keys and of the keys, in the order of their names."""
+    base = keys.key_blocks[names[0]].relative_key
+    return digest(base), *(digest(keys.key_blocks[name]) for name in sorted(names))
+
+
+def is_outdated(keys: bpy.types.Key, one: Combined) -> bool:
+    """Whether the base or a key has another shape than when the keys were combined, or a key is missing."""
+    if not all(name in keys.key_blocks for name in one.keys):
+        return True
+    return bool(one.digests) and digests_of(keys, one.keys) != one.digests
 
 
 def write(keys: bpy.types.Key, combinations: list[Combined], undo: ExitStack) -> None:

@@ -56,6 +56,15 @@ def read(keys: bpy.types.Key, chain: str, vertices: int) -> tuple[Shape, Shapes]
     return base, dict(zip(places.tolist(), shapes, strict=True))
 
 
+def vertices_before(keys: bpy.types.Key, chain: str) -> int | None:
+    """Number of vertices of the mesh when the shapes of a chain were stored; None if there are none."""
+    data = keys.get(_property(chain))
+    if not isinstance(data, bytes) or len(data) < _HEADER.size:
+        return None
+    magic, _, vertices = _HEADER.unpack_from(data)
+    return int(vertices) if magic == _MAGIC else None
+
+
 def forget(keys: bpy.types.Key, chain: str, undo: ExitStack) -> None:
     """Remove the shapes of a chain."""
     id_properties.remove(keys, _property(chain), undo)

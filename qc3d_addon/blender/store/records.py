@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
@@ -24,7 +23,8 @@ from ...solver.errors import InputError
 from ...solver.settings import Easing
 from . import id_properties
 from . import stored_values as stored
-from .names import LIMIT, MAX_STEPS
+from .chain_values import keyframe_values, keyframes_of, places_of, request_of
+from .names import LIMIT
 from .renames import renamed
 from .summaries import Summary
 
@@ -36,8 +36,6 @@ PROPERTY = "qc3d"
 # of even steps with hat functions, instead of places and corners.
 VERSION = 2
 
-LEAST_DISTANCE = 1e-5  # smallest difference between two places
-_MOST_FRAME = 2**31  # largest absolute value of a frame number
 _LONGEST_KEY = 2 * LIMIT  # bytes; a mirror image may have invented key names, longer than Blender's limit
 _LONGEST_FINGERPRINT = 1000
 _LONGEST_DIGEST = 64
@@ -100,7 +98,7 @@ class Chain:
         """What ``dataclasses.asdict`` makes of it; raises ValueError, KeyError or TypeError for anything else."""
         found = dict(stored.plain_dict(values))
         through = tuple(stored.name(name, _LONGEST_KEY) for name in stored.plain_list(found.pop("through")))
-        places, corners = _places(found)
+        places, corners = places_of(found)
         by_text = stored.plain_dict(found.pop("keys"))
         steps = {str(step): step for step in range(len(places))}
         keys = {steps[text]: stored.name(name) for text, name in by_text.items()}
@@ -110,12 +108,8 @@ class Chain:
             raise ValueError("one key for two steps")
         keyframes = found.pop("keyframes", None)
         if keyframes is not None:
-            keyframes = tuple(
-                stored.whole(frame, -_MOST_FRAME, _MOST_FRAME) for frame in stored.plain_list(keyframes)
-            )
-            if len(keyframes) not in (2, len(through)) or any(last <= first for first, last in pairwise(keyframes)):
-                raise ValueError("keyframes that are not those of keys, or without time between them")
-        request, result = _request(found.pop("request", {})), Summary.from_json(found.pop("result", None))
+            keyframes = keyframes_of(keyframes, len(through))
+        request, result = request_of(found.pop("request", {})), Summary.from_json(found.pop("result", None))
         slider, mirror_of = stored.name(found.pop("slider")), stored.text(found.pop("mirror_of", ""), LIMIT)
         on_key = stored.text(found.pop("on_key", ""), LIMIT)
         digests = tuple(stored.text(one, _LONGEST_DIGEST) for one in stored.plain_list(found.pop("digests", [])))
@@ -171,12 +165,6 @@ class Chain:
         from ...solver.frames.weights import Weights  # scipy would make Blender start slower
 
         return Weights.smooth(self.places, self.corners)
-
-
-def keyframe_values(frames: Sequence[int], via_at: Sequence[float]) -> list[tuple[float, float]]:
-    """Frames and values of keyframes at the first and the last key, or at each of them with the places of the inner."""
-    inner = via_at if len(frames) > 2 else ()
-    return [(float(frame), value) for frame, value in zip(frames, (0.0, *inner, 1.0), strict=False)]
 
 
 @dataclass(frozen=True)
@@ -313,29 +301,3 @@ def _state(text: str, owner: str) -> State:
         return State(len(Record._parsed(text, owner).chains))
     except InputError as error:
         return State(0, str(error), isinstance(error, DamagedRecordError))
-
-
-def _places(found: dict[str, Any]) -> tuple[tuple[float, ...], tuple[int, ...]]:
-    """Remove the places and corners from a chain's values and return them."""
-    if "intervals" in found:
-        intervals = stored.whole(found.pop("intervals"), 1, MAX_STEPS)
-        return tuple(step / intervals for step in range(intervals + 1)), tuple(range(1, intervals))
-    places = tuple(stored.number(place, 0.0, 1.0) for place in stored.plain_list(found.pop("places")))
-    corners = tuple(stored.whole(step, 1, len(places) - 2) for step in stored.plain_list(found.pop("corners")))
-    if not 2 <= len(places) <= MAX_STEPS + 1 or (places[0], places[-1]) != (0.0, 1.0):
-        raise ValueError("not places from 0 to 1")
-    if any(later - place < LEAST_DISTANCE for place, later in pairwise(places)):
-        raise ValueError("places that are not in order")
-    if any(later <= step for step, later in pairwise(corners)):
-        raise ValueError("corners that are not in order")
-    return places, corners
-
-
-def _request(values: object) -> dict[str, Any]:
-    """The stored request of a bake: plain values, and dictionaries and lists of plain values."""
-    found = stored.plain_dict(values)
-    for value in found.values():
-        for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else (value,):
-            if isinstance(inner, (dict, list)):
-                raise ValueError("nested too deep")
-    return found

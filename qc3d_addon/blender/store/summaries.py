@@ -127,11 +127,11 @@ class Summary:
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of_report(cls, report: BakeReport, places: Sequence[float], notes: Sequence[str]) -> Summary:
-        """The results in the solver's ``report`` about shapes at these places of the control."""
+    def of_report(cls, report: BakeReport, places: Sequence[float], keys: int, notes: Sequence[str]) -> Summary:
+        """The results in the solver's ``report`` about shapes at these places of the control, of which are ``keys``."""
         worst, played = report.worst_stretch, report.played
         return cls(
-            count=len(places) - 2,
+            count=len(places) - keys,
             engine=report.engine,
             seconds=sum(report.seconds.values()),
             folds=_summed(report.folds.frames),

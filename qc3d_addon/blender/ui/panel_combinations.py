@@ -44,7 +44,8 @@ class QC3D_PT_combinations(bpy.types.Panel):
             return
         for one in made:
             row = layout.row(align=True)
-            row.label(text=one.label, icon='CHECKMARK')
+            outdated = combined_keys.is_outdated(keys_of(obj), one)
+            row.label(text=one.label, icon='ERROR' if outdated else 'CHECKMARK')
             again = row.operator(QC3D_OT_combine_keys.bl_idname, text="", icon='FILE_REFRESH')
             again.first, again.second, again.third = (*one.keys, "")[:3]
             again.find_order = False
@@ -52,6 +53,8 @@ class QC3D_PT_combinations(bpy.types.Panel):
                 turned = row.operator(QC3D_OT_combine_keys.bl_idname, text="", icon='ARROW_LEFTRIGHT')
                 turned.first, turned.second, turned.find_order = one.keys[1], one.keys[0], False
             row.operator(QC3D_OT_remove_combination.bl_idname, text="", icon='TRASH').label = one.label
+            if outdated:
+                draw_sentence(context, layout, "Its keys have changed since; combine them again.", 'ERROR')
         _draw_verdicts(context, layout, obj, {frozenset(one.keys) for one in made})
 
 

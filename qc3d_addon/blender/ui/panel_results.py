@@ -98,6 +98,10 @@ def _draw_chain(
         draw_sentence(context, layout, control_problem, 'ERROR')
     elif not is_listed:  # else the list has it
         layout.prop(*control.shown, text=control.name, slider=True)
+    original = chain_keys.original_of(obj, chain)
+    if original is not None:
+        sentence = f"The slider of '{original.name}' still plays these in-betweens; re-bake to have their own."
+        draw_sentence(context, layout, sentence, 'ERROR')
     if chain_keys.are_drivers_stopped(keys_of(obj), chain):
         draw_sentence(context, layout, _STOPPED, 'ERROR')
     problem = checks.chain_problem(keys_of(obj), chain)

@@ -10,7 +10,8 @@ import bpy
 
 from ...worker import engines
 from ..bake import jobs, progress_bar, timeline
-from ..bake.suggested_keys import sculpted_between
+from ..bake.suggested_keys import made_keys, sculpted_between
+from ..keys.leftovers import leftovers, sentence
 from ..kinds import keys_of, present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_bake_objects
 from ..operators.bake_keys import QC3D_OT_bake_keys
@@ -58,6 +59,9 @@ class QC3D_PT_inbetweens(bpy.types.Panel):
         problem = checks.object_problem(obj)
         if obj is not None and problem is None:
             _draw_choices(layout, obj)
+            joined = sentence(leftovers(keys_of(obj), made_keys(keys_of(obj))))
+            if joined is not None:
+                draw_sentence(context, layout, joined)
             problem = checks.keys_problem(keys_of(obj), panel_keys(settings_of(obj)))
         job = jobs.current()
         if job is not None:
@@ -129,11 +133,9 @@ def _draw_keys(layout: bpy.types.UILayout, obj: bpy.types.Object, settings: Obje
     for index, inner in enumerate(settings.via):
         row = column.row(align=True)
         row.prop_search(inner, "name", keys, "key_blocks", text="Through", icon='SHAPEKEY_DATA')
-        if settings.via_timing != "even":
-            value = row.row(align=True)
-            value.ui_units_x = 3.0
-            value.prop(inner, "at" if settings.via_timing == "value" else "frame", text="")
         row.operator(QC3D_OT_remove_inner_key.bl_idname, text="", icon='REMOVE').index = index
+        if settings.via_timing != "even":  # in a row of its own, so that the name keeps its room
+            column.prop(inner, "at" if settings.via_timing == "value" else "frame")
     column.prop_search(settings, "last", keys, "key_blocks", icon='SHAPEKEY_DATA')
     if settings.via:
         column.row().prop(settings, "via_timing", expand=True)

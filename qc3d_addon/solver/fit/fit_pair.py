@@ -13,18 +13,16 @@ from ..arrays import Floats
 from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair, require_sizes
 from ..keys.orientation import require_reachable
-from ..meshing.cube import fill_cube
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
-from ..tets.point_location import interpolation_matrix
 from ..triangles.topology import sides
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
-from .fold_free import FoldFreeFitter
 from .meeting import MET, crossing_vertices, meet_keys
+from .volume import Volume, in_single_precision
 
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
@@ -32,13 +30,16 @@ _MOST_NAMED = 10  # vertices
 _LEAST_EDGE = 1e-6  # cube units: shorter edges have no stretch that can be told
 
 
-def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
+def fit_pair(pair: KeyPair, options: FitOptions, shared: Volume | None = None) -> Steps[FittedMap]:
     """Embed both keys, fill the cube and fit the fold-free map that carries the first key onto the second.
 
     Parameters
     ----------
     pair : KeyPair
     options : FitOptions
+    shared : Volume, optional
+        The volume around the first key, if it is known already. If the second key does not fit into its cube, the pair
+        gets one of its own.
 
     Raises
     ------
@@ -56,8 +57,13 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     require_sizes(pair)
     out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
-    embedding = Embedding.of(pair)
-    fitted = yield from (_meeting if options.quality == "exact" else _near)(embedding, options, seconds)
+    embedding = None if shared is None else Embedding.of(pair, shared.cube)
+    if embedding is None or shared is None or shared.cube is None or not shared.cube.holds(embedding):
+        embedding, shared = Embedding.of(pair), None
+    if options.quality == "exact":
+        fitted = yield from _meeting(embedding, options, seconds)
+    else:
+        fitted = yield from _near(embedding, options, seconds, shared)
     notes = [*fitted.notes]
     turned = half_turned_parts(fitted.surface_path)
     missed = fitted.landmark_residual().rms
@@ -82,67 +88,42 @@ def fit_pair(pair: KeyPair, options: FitOptions) -> Steps[FittedMap]:
     return replace(fitted, notes=tuple(notes))
 
 
-def _near(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
+def _near(
+    embedding: Embedding, options: FitOptions, seconds: dict[str, float], shared: Volume | None
+) -> Steps[FittedMap]:
     """The map of a volume whose tetrahedra do not follow the vertices: it comes near the second key."""
-    faces = embedding.pair.faces
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(_in_single_precision(embedding.key0), faces, options)
+            volume = shared or Volume.filled(embedding, options)
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
-            landmarks = interpolation_matrix(filled.mesh, embedding.key0)
-            rounded = interpolation_matrix(filled.mesh, _in_single_precision(embedding.key0))
+            fitter = volume.fitter
         yield Progress("locate", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        fitter = FoldFreeFitter(filled.mesh, rounded, _in_single_precision(embedding.weights))
-        followed = yield from staged("fit", follow_path(fitter, [_in_single_precision(target) for target in targets]))
+        followed = yield from staged("fit", follow_path(fitter, [in_single_precision(target) for target in targets]))
     yield Progress("fit", 1.0)
-    return FittedMap(
-        embedding.pair,
-        filled.mesh,
-        followed.maps,
-        followed.turns,
-        options,
-        filled.engine,
-        embedding,
-        landmarks,
-        filled.notes,
-        seconds,
-        path,
-    )
+    parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
+    return FittedMap(embedding.pair, volume, *parts)
 
 
 def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:
     """The map that meets the second key."""
-    faces = embedding.pair.faces
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            filled = fill_cube(embedding.key0, faces, options, _stretches(embedding))
+            volume = Volume.filled(embedding, options, stretches=_stretches(embedding))
         yield Progress("mesh", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        met = yield from staged("fit", meet_keys(embedding, filled.mesh, targets))
+        followed = yield from staged("fit", meet_keys(embedding, volume.mesh, volume.landmarks, targets))
     yield Progress("fit", 1.0)
-    maps, turns = met.followed.maps, met.followed.turns
-    return FittedMap(
-        embedding.pair,
-        filled.mesh,
-        maps,
-        turns,
-        options,
-        filled.engine,
-        embedding,
-        met.landmarks,
-        filled.notes,
-        seconds,
-        path,
-    )
+    parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
+    return FittedMap(embedding.pair, volume, *parts)
 
 
 def _stretches(embedding: Embedding) -> Floats:
@@ -176,15 +157,6 @@ def _way(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -
     with timed(seconds, "path"):
         path = path_between(embedding, options)
         return path, path_to(path, embedding.key1)
-
-
-def _in_single_precision(values: Floats) -> Floats:
-    """Values rounded to single precision.
-
-    A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as keys
-    that were moved, must lead to the same map.
-    """
-    return np.asarray(values, dtype=np.float32).astype(np.float64)
 
 
 def _parts(count: int) -> str:

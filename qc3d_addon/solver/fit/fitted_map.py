@@ -11,17 +11,16 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import Floats
-from ..keys.embedding import Embedding
+from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
 from ..settings import FitOptions
 from ..surface.path import SurfacePath
 from ..tets.mesh import TetMesh
-from ..tets.point_location import interpolation_matrix
-from ..triangles.winding_number import insideness, winding_numbers
 from .directions import path_between
 from .fold_free import FoldFreeFitter
 from .fold_repair import covered
+from .volume import Volume
 
 _REPAIR_ITERATIONS = 15  # of a fit that starts close to its target
 
@@ -49,7 +48,7 @@ class FittedMap:
     Parameters
     ----------
     pair : KeyPair
-    mesh : TetMesh
+    volume : Volume
         The filled unit cube.
     maps : (K + 1, N, 3)
         Values, in cube units, of fold-free maps along the way, evenly spaced in time. The first is the identity, the
@@ -58,12 +57,8 @@ class FittedMap:
         Unwrapped rotation vectors of the tetrahedra of the last map, radians.
     options : FitOptions
         The options that it was fitted with.
-    engine : str
-        The engine that made the mesh; the option ``auto`` leaves it open.
     embedding : Embedding
         The pair in cube units.
-    landmarks : (n, N) sparse
-        Barycentric coordinates of the first key's vertices in the mesh.
     notes : tuple of str
         Sentences for the user, such as why another engine was used.
     seconds : dict
@@ -73,13 +68,11 @@ class FittedMap:
     """
 
     pair: KeyPair
-    mesh: TetMesh
+    volume: Volume
     maps: Floats
     turns: Floats
     options: FitOptions
-    engine: str
     embedding: Embedding
-    landmarks: csr_array
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     path: SurfacePath | None = field(default=None, repr=False)
@@ -94,11 +87,27 @@ class FittedMap:
         options: FitOptions,
         engine: str,
         notes: tuple[str, ...] = (),
+        cube: Cube | None = None,
     ) -> FittedMap:
         """Restore a fitted map from its stored parts; everything else is computed again."""
-        embedding = Embedding.of(pair)
-        landmarks = interpolation_matrix(mesh, embedding.key0)
-        return cls(pair, mesh, maps, turns, options, engine, embedding, landmarks, notes)
+        embedding = Embedding.of(pair, cube)
+        volume = Volume(mesh, engine, embedding.key0, pair.faces, embedding.weights, cube=cube)
+        return cls(pair, volume, maps, turns, options, embedding, notes)
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The tetrahedra of the filled cube."""
+        return self.volume.mesh
+
+    @property
+    def engine(self) -> str:
+        """The engine that made them."""
+        return self.volume.engine
+
+    @property
+    def landmarks(self) -> csr_array:
+        """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
+        return self.volume.landmarks
 
     @property
     def mapped(self) -> Floats:
@@ -111,13 +120,8 @@ class FittedMap:
         return self.path or path_between(self.embedding, self.options)
 
     @cached_property
-    def insideness(self) -> Floats:
-        """(M,) weight of each tetrahedron by its winding number: 1 inside the object, small outside."""
-        return insideness(winding_numbers(self.embedding.key0, self.pair.faces, self.mesh.centroids))
-
-    @cached_property
     def fitter(self) -> FoldFreeFitter:
-        """The fitter for further maps of the same mesh."""
+        """The fitter that repairs maps of the same mesh."""
         return FoldFreeFitter(self.mesh, self.landmarks, self.embedding.weights)
 
     def folds(self, values: Floats) -> int:

@@ -9,7 +9,6 @@ and then the landmarks' weight is increased until they are met.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -20,7 +19,6 @@ from ..collision.crossings import crossing_pairs
 from ..keys.embedding import Embedding
 from ..support.progress import told
 from ..tets.mesh import TetMesh
-from ..tets.point_location import interpolation_matrix
 from .continuation import FollowedPath, follow_path
 from .fold_free import LANDMARK_WEIGHT
 from .stiff_landmarks import StiffFitter
@@ -37,23 +35,9 @@ _LEAST_LENGTH = 0.05  # relative to the mean
 _WEIGHT_AT_CROSSINGS = 1e-2  # relative to that of other landmarks
 
 
-@dataclass(frozen=True, eq=False)
-class MetKeys:
-    """A map that meets both keys, with the maps of the motion in between.
-
-    Parameters
-    ----------
-    landmarks : (n, N) sparse
-        Barycentric coordinates of the first key's vertices.
-    followed : FollowedPath
-        The maps along the way; the last one meets the second key.
-    """
-
-    landmarks: csr_array
-    followed: FollowedPath
-
-
-def meet_keys(embedding: Embedding, mesh: TetMesh, targets: Sequence[Floats]) -> Generator[float, None, MetKeys]:
+def meet_keys(
+    embedding: Embedding, mesh: TetMesh, landmarks: csr_array, targets: Sequence[Floats]
+) -> Generator[float, None, FollowedPath]:
     """Follow the motion and meet the second key.
 
     Parameters
@@ -61,6 +45,8 @@ def meet_keys(embedding: Embedding, mesh: TetMesh, targets: Sequence[Floats]) ->
     embedding : Embedding
     mesh : TetMesh
         A tetrahedral mesh of the cube, as fine as the surface.
+    landmarks : (n, N) sparse
+        Barycentric coordinates of the first key's vertices.
     targets : sequence of (n, 3)
         Target positions of the vertices after each step, in cube units; the last is the second key.
 
@@ -70,7 +56,7 @@ def meet_keys(embedding: Embedding, mesh: TetMesh, targets: Sequence[Floats]) ->
         The fraction that is done, in [0, 1].
     """
     base = _weights(embedding)
-    fitter = StiffFitter(mesh, interpolation_matrix(mesh, embedding.key0), _WEIGHT_ON_THE_WAY / LANDMARK_WEIGHT * base)
+    fitter = StiffFitter(mesh, landmarks, _WEIGHT_ON_THE_WAY / LANDMARK_WEIGHT * base)
     followed = yield from told(follow_path(fitter, targets), lambda part: 0.6 * part)
     diagonal = embedding.pair.diagonal * embedding.scale
     reachable = ~crossing_vertices(embedding)
@@ -89,7 +75,7 @@ def meet_keys(embedding: Embedding, mesh: TetMesh, targets: Sequence[Floats]) ->
         before = left
         weights = base * np.minimum(1.0, _STRONGEST_AT / np.maximum(missed, 1e-300))
         yield 0.6 + 0.4 * min(1.0, (number + 1) / len(_WEIGHTS))
-    return MetKeys(fitter.landmarks, followed.ending_with(mesh, mapped))
+    return followed.ending_with(mesh, mapped)
 
 
 def crossing_vertices(embedding: Embedding) -> Bools:

@@ -8,19 +8,24 @@ import hashlib
 import io
 import json
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..files.npz import Archive
+from ..keys.embedding import Cube
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
 from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from .fitted_map import FittedMap
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4  # up to 3, every pair had a cube of its own
+_OLDEST = 3
 _SEAL_LENGTH = 32
+_NOT_ORTHONORMAL = 1e-9
+_CUBE = ("axes", "centre", "scale")
 _DAMAGED = "The stored map is damaged; fit the keys again."
 _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)
 
@@ -45,12 +50,14 @@ def _seal(content: bytes) -> bytes:
 
 def to_bytes(fitted: FittedMap) -> bytes:
     """Store a fitted map, preceded by a checksum. Of the keys only the hash is stored."""
+    cube = fitted.volume.cube
     header = {
         "version": FORMAT_VERSION,
         "fingerprint": fingerprint(fitted.pair),
         "options": asdict(fitted.options),
         "engine": fitted.engine,
         "notes": list(fitted.notes),
+        "cube": None if cube is None else {name: np.asarray(getattr(cube, name)).tolist() for name in _CUBE},
     }
     buffer = io.BytesIO()
     np.savez_compressed(
@@ -87,7 +94,7 @@ def why_unusable(data: bytes) -> str | None:
         return "is damaged"
     if not isinstance(version, int):
         return "is damaged"
-    if version == FORMAT_VERSION:
+    if _OLDEST <= version <= FORMAT_VERSION:
         return None
     return f"was made by {'an earlier' if version < FORMAT_VERSION else 'a later'} version of QC3D"
 
@@ -110,12 +117,13 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     try:
         header = json.loads(bytes(stored["header"]))
         version, owner = header["version"], header["fingerprint"]
-        if version != FORMAT_VERSION:
+        if version not in range(_OLDEST, FORMAT_VERSION + 1):
             raise InputError(
                 f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
             )
         options, engine = FitOptions(**header["options"]), str(header["engine"])
         notes = tuple(str(note) for note in header["notes"])
+        cube = _cube(header.get("cube"))
         points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
         tets = np.asarray(stored["tets"], dtype=np.int64)
     except _UNREADABLE as error:
@@ -132,4 +140,20 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     # Jacobians exist only if no volume is zero.
     if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
-    return FittedMap.restored(pair, mesh, maps, turns, options, engine, notes)
+    fitted = FittedMap.restored(pair, mesh, maps, turns, options, engine, notes, cube)
+    if cube is not None and not cube.holds(fitted.embedding):
+        raise InputError(_DAMAGED)
+    return fitted
+
+
+def _cube(values: dict[str, Any] | None) -> Cube | None:
+    """The cube that ``to_bytes`` wrote; raises ValueError, KeyError or TypeError if it is none."""
+    if values is None:
+        return None
+    axes, centre, scale = (np.asarray(values[name], dtype=np.float64) for name in _CUBE)
+    shapes = (axes.shape, centre.shape, scale.shape)
+    if shapes != ((3, 3), (3,), ()) or not all(np.isfinite(part).all() for part in (axes, centre, scale)):
+        raise ValueError("not a cube")
+    if np.abs(axes @ axes.T - np.eye(3)).max() > _NOT_ORTHONORMAL or not scale > 0.0:
+        raise ValueError("not a cube")
+    return Cube(axes, centre, float(scale))

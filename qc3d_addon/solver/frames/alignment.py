@@ -62,8 +62,8 @@ class RigidMove:
         turned, rotation = spread, np.eye(3)
         floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
         for _ in range(_STEPS):
-            levers = np.cross(turned[:, None], np.eye(3))
-            inertia = np.einsum("n,nia,nja->ij", weights, levers, levers) + floor * np.eye(3)
+            spreads = turned.T @ (weights[:, None] * turned)
+            inertia = (np.trace(spreads) + floor) * np.eye(3) - spreads
             moment = weights @ np.cross(turned, missing - (turned - spread))
             step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
             turned, rotation = turned @ step.T, step @ rotation

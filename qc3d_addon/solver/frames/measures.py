@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Floats, Ints
 from ..fit.fitted_map import FittedMap
@@ -93,7 +92,6 @@ class VertexMeasures:
         self._triangles_around = order // 3
         self._starts = np.flatnonzero(np.diff(corners[order], prepend=-1))
         self._with_triangles = corners[order][self._starts]
-        self._averages = [_LandmarkAverages(part) for part in fitted]
         self._before = [np.broadcast_to(np.eye(3), (self._count, 3, 3))]
         for number, part in enumerate(fitted[:-1]):
             whole = part.embedding.motion.rotation @ self._jacobians(number, part.mapped)
@@ -120,7 +118,10 @@ class VertexMeasures:
 
     def _jacobians(self, number: int, values: Floats) -> Floats:
         """(n, 3, 3) Jacobians around the vertices of a map of the cube (N, 3)."""
-        return self._averages[number].of(self._fitted[number].mesh.jacobians(values))
+        volume = self._fitted[number].volume
+        landmarks, around = volume.around_landmarks
+        jacobians = volume.mesh.jacobians(values).reshape(-1, 9)
+        return np.asarray((landmarks @ (around @ jacobians)).reshape(-1, 3, 3))
 
     def _at_vertices(self, ratios: Floats) -> Floats:
         """(n,) the ratio of the triangles (m,) around each vertex that is farthest from 1; 1 where there are none."""
@@ -131,20 +132,6 @@ class VertexMeasures:
             largest, smallest = (extreme.reduceat(around, self._starts) for extreme in (np.maximum, np.minimum))
             farthest[self._with_triangles] = np.where(largest >= -smallest, largest, smallest)
         return np.asarray(np.exp(farthest))
-
-
-class _LandmarkAverages:
-    """Averages of the tetrahedra around the first key's vertices: first at the mesh's vertices, then at landmarks."""
-
-    def __init__(self, fitted: FittedMap) -> None:
-        mesh = fitted.mesh
-        self._around = csr_array(mesh.incidence @ diags_array(mesh.volumes * fitted.insideness))
-        totals = fitted.landmarks @ self._around.sum(axis=1)
-        self._landmarks = csr_array(diags_array(1.0 / totals) @ fitted.landmarks)
-
-    def of(self, matrices: Floats) -> Floats:
-        """(n, 3, 3) averages of matrices (M, 3, 3) of the tetrahedra."""
-        return np.asarray((self._landmarks @ (self._around @ matrices.reshape(-1, 9))).reshape(-1, 3, 3))
 
 
 class EdgeExcess:

@@ -17,7 +17,7 @@ from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
 from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
-from ..surface.path import SurfacePath
+from ..surface.path import SWEEPS, SurfacePath
 from .alignment import CalmAlignment, RigidMove
 from .extra_turns import ExtraSpins
 from .frame import Frame
@@ -27,6 +27,7 @@ from .straighter import Straighter, more_than
 from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
+_SWEEPS_AT_KEYS = 2  # nothing is left to settle there
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
@@ -43,7 +44,7 @@ class NaturalFrames:
     def __init__(self, fitted: FittedMap) -> None:
         self._fitted = fitted
         self.notes: tuple[str, ...] = ()
-        embedding, mesh = fitted.embedding, fitted.mesh
+        embedding = fitted.embedding
         self._surface = fitted.surface_path
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
         self._turns = turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
@@ -52,7 +53,7 @@ class NaturalFrames:
         faces = fitted.pair.welded_faces
         with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
             turning = turning_inside(fitted, self._surface)
-            self._volume = VolumePath(mesh, fitted.maps, turning, fitted.insideness, fitted.options.stretch)
+            self._volume = VolumePath(fitted.volume.system, fitted.maps, turning, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
         self._alignment = CalmAlignment(embedding, turns)
@@ -132,12 +133,16 @@ class NaturalFrames:
         positions: list[Floats] = []
         excess: list[int | None] = []
         yield 0.0
-        few = batches(times.tolist(), self._surface.shapes_at_once)
+        at_keys = np.isin(times, (0.0, 1.0))
+        few = batches(times[~at_keys].tolist(), self._surface.shapes_at_once)
+        few += [times[at_keys].tolist()] if at_keys.any() else []
         for maps, shapes, crossing in in_threads(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
             yield len(volumes) / len(times)
+        order = np.argsort(np.argsort(at_keys, kind="stable"))
+        volumes, positions, excess = ([found[place] for place in order] for found in (volumes, positions, excess))
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
         if any(crossings):
             embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
@@ -172,10 +177,15 @@ class NaturalFrames:
         return Frame.of(self._fitted, positions, found, time, repaired, crossings, move)
 
     def _first_try(self, times: Sequence[float]) -> tuple[Floats, list[Floats], list[int | None]]:
-        """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings."""
+        """Values (k, N, 3) of the maps at ``times``, the surface's cube positions, and their excess of crossings.
+
+        The times are those of the two keys, or others.
+        """
         maps = self._volume.maps_at(times)
-        shapes = self._shaped(self._surface, self._moments(maps, times))
-        return maps, shapes, [self._limit.excess(shape) for shape in shapes]
+        at_keys = times[0] in (0.0, 1.0)
+        sweeps = _SWEEPS_AT_KEYS if at_keys else SWEEPS
+        shapes = self._shaped(self._surface, self._moments(maps, times), sweeps)
+        return maps, shapes, [0 if at_keys else self._limit.excess(shape) for shape in shapes]
 
     def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
         """Cube positions (n, 3) carried to the keys' coordinates; what goes straight, ``held`` (n,), is exactly there.
@@ -189,11 +199,13 @@ class NaturalFrames:
         positions[held] = pair.key0[held] + time * (pair.key1 - pair.key0)[held]
         return positions
 
-    def _shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
+    def _shaped(
+        self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]], sweeps: int = SWEEPS
+    ) -> list[Floats]:
         """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
         return [
             self._symmetric(self._spins.apply(shape, time), time)
-            for (time, _), shape in zip(moments, surface.shapes(moments), strict=True)
+            for (time, _), shape in zip(moments, surface.shapes(moments, sweeps), strict=True)
         ]
 
     def _symmetric(self, shape: Floats, time: float) -> Floats:

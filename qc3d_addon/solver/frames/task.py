@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -18,6 +18,7 @@ from ..errors import naming_pair
 from ..fit.fit_pair import fit_pair
 from ..fit.fitted_map import FittedMap
 from ..fit.storage import from_bytes, to_bytes
+from ..fit.volume import Volume
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
 from ..settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from ..support.memory import estimated_mb, require_memory
@@ -113,13 +114,21 @@ class Task:
         """Number of fits of the mesh to compute."""
         return len(self.pairs) - len(self.kept) if self.needs_fits else 0
 
-    def require_memory(self, limit_mb: float) -> None:
-        """Raise InputError, before the work starts, if it needs more than ``limit_mb`` megabytes; 0 means no limit."""
+    @property
+    def estimated_mb(self) -> float:
+        """Estimated peak memory of the work, in megabytes."""
         pair, quality = next(iter(self.pairs.values())), self.fit_options.quality
         vertices, triangles = len(pair.key0), len(pair.faces)
-        needed = estimated_mb(vertices, len(self.pairs), self.frame_count, quality, self.needs_fits, triangles)
+        return estimated_mb(vertices, len(self.pairs), self.frame_count, quality, self.needs_fits, triangles)
+
+    def require_memory(self, limit_mb: float) -> None:
+        """Raise InputError, before the work starts, if it needs more than ``limit_mb`` megabytes; 0 means no limit."""
         if limit_mb:
-            require_memory(needed, limit_mb, vertices)
+            require_memory(self.estimated_mb, limit_mb, len(next(iter(self.pairs.values())).key0))
+
+    def carried_out(self) -> Steps[Outcome]:
+        """See ``carry_out``."""
+        return carry_out(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +147,14 @@ class Outcome:
     bake: Bake | None
 
 
-def carry_out(task: Task) -> Steps[Outcome]:
+def carry_out(task: Task, shared: Callable[[KeyPair], Volume | None] = lambda pair: None) -> Steps[Outcome]:
     """Compute the missing fits, then the frames. All bakes go this way.
+
+    Parameters
+    ----------
+    task : Task
+    shared : callable
+        Returns the volume around the first key of a pair, if other tasks made it already.
 
     Raises
     ------
@@ -159,7 +174,7 @@ def carry_out(task: Task) -> Steps[Outcome]:
         with naming_pair(*ends, names):
             data = task.kept.get(ends)
             if data is None:
-                fits[ends] = yield from numbered(fit_pair(pair, task.fit_options), made, every)
+                fits[ends] = yield from numbered(fit_pair(pair, task.fit_options, shared(pair)), made, every)
                 data, made = to_bytes(fits[ends]), made + 1
             else:
                 fits[ends] = from_bytes(data, pair)

@@ -26,6 +26,8 @@ NEARLY_STILL = 1e-4
 # Distance of the keys from the cube's faces: the volume around them needs room to move, and in-betweens may reach a
 # little beyond both keys.
 MARGIN = 0.17
+# Size of a cube that several keys share, beside the size of their base: some keys reach beyond it.
+ROOM = 1.25
 # Where this part of the surface is still, it holds the whole.
 _MOST_HELD = 0.04
 
@@ -107,6 +109,41 @@ class RigidMotion:
 
 
 @dataclass(frozen=True, eq=False)
+class Cube:
+    """Where the unit cube stands.
+
+    Parameters
+    ----------
+    axes : (3, 3)
+        Orthonormal rows: the axes of the cube in the keys' coordinates.
+    centre : (3,)
+        The point that goes to the center of the cube, in coordinates along the axes.
+    scale : float
+        Cube units per unit of the keys.
+    """
+
+    axes: Floats
+    centre: Floats
+    scale: float
+
+    @classmethod
+    def around(cls, pair: KeyPair) -> Cube:
+        """The cube around the first key of a pair, whatever the second is, with room for most motions.
+
+        All keys of one base lie in it with that base in one and the same place.
+        """
+        axes = own_axes(pair.key0, pair.key0, vertex_areas(pair.key0, *pair.covering))
+        placed = pair.key0 @ axes.T
+        low, high = placed.min(axis=0), placed.max(axis=0)
+        size = ROOM * float((high - low).max())
+        return cls(axes, 0.5 * (low + high), (1.0 - 2.0 * MARGIN) / (size if size > 0.0 else pair.diagonal))
+
+    def holds(self, embedding: Embedding) -> bool:
+        """Whether both keys of a pair that is embedded in this cube keep their distance from its faces."""
+        return all(float(np.abs(key - 0.5).max()) <= 0.5 - MARGIN for key in (embedding.key0, embedding.key1))
+
+
+@dataclass(frozen=True, eq=False)
 class Embedding:
     """How a pair lies in the unit cube: one similarity for both keys, and the rigid motion removed from the second.
 
@@ -137,16 +174,21 @@ class Embedding:
     scale: float
 
     @classmethod
-    def of(cls, pair: KeyPair) -> Embedding:
-        """Embed a pair so that both keys, the second without its rigid motion, just fit into [0.17, 0.83]³."""
+    def of(cls, pair: KeyPair, cube: Cube | None = None) -> Embedding:
+        """Embed a pair so that both keys, the second without its rigid motion, just fit into [0.17, 0.83]³.
+
+        If a ``cube`` is given, embed the pair in that one instead; ``Cube.holds`` tells whether it fits.
+        """
         faces, shares = pair.covering
         areas = vertex_areas(pair.key0, faces, shares)
-        axes = own_axes(pair.key0, pair.key1, areas)
+        axes = own_axes(pair.key0, pair.key1, areas) if cube is None else cube.axes
         key0, key1 = pair.key0 @ axes.T, pair.key1 @ axes.T
         diagonal = float(np.linalg.norm(np.ptp(key0, axis=0))) or pair.diagonal
         travel = np.linalg.norm(key1 - key0, axis=1) / diagonal
         moves = _free_part(travel, areas)
         motion = RigidMotion.of_surface(key0, key1, faces, shares).part(moves) if moves else RigidMotion.identity()
+        if cube is not None:
+            return cls(pair, axes, travel, motion, cube.centre, cube.scale)
         both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())

@@ -85,7 +85,8 @@ class KeyPair:
         Raises
         ------
         InputError
-            If shapes disagree, a coordinate is not finite or within a factor of 4 of that, an index is out of range, or there are no vertices.
+            If shapes disagree, a coordinate is not finite or within a factor of 4 of that, an index is out of range, or
+            there are no vertices.
         """
         first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
         if first.shape != second.shape:
@@ -252,7 +253,8 @@ def _positions(key: ArrayLike, name: str) -> Floats:
     largest = float(np.abs(positions).max(initial=0.0))
     if largest > _FARTHEST:
         raise InputError(
-            f"The {name} key has coordinates up to {largest:.0e}, whose differences are no numbers; repair the key first."
+            f"The {name} key has coordinates up to {largest:.0e}, whose differences are no numbers; repair the key "
+            "first."
         )
     return positions
 

@@ -41,7 +41,9 @@ class FilledCube:
     notes: tuple[str, ...]
 
 
-def fill_cube(points: Floats, faces: Ints, options: FitOptions, stretches: Floats | None = None) -> FilledCube:
+def fill_cube(
+    points: Floats, faces: Ints, options: FitOptions, stretches: Floats | None = None, size: float = 1.0
+) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
     The surface's vertices do not become vertices of the mesh: its resolution depends on ``options.quality``, not on
@@ -57,6 +59,9 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, stretches: Float
         Its quality, engine, seed and time limit.
     stretches : (n,), optional
         How many times longer the edges at each vertex are in the second key; quality ``exact`` is finer there.
+    size : float
+        Size of the surface, beside its size where it fills the cube: samples on it are as many, and so much closer.
+        Without effect on the quality ``exact``, which follows the vertices.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def fill_cube(points: Floats, faces: Ints, options: FitOptions, stretches: Float
         mesh = vertex_mesh(points, faces, options.seed, stretches)
         require_filled_cube(mesh)
         return FilledCube(mesh, "delaunay", ())
-    resolution = RESOLUTIONS[options.quality].beside(points, faces)
+    resolution = RESOLUTIONS[options.quality].scaled(size).beside(points, faces)
     notes: list[str] = []
     if options.engine != "delaunay":
         try:

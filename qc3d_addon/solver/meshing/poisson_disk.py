@@ -50,6 +50,10 @@ class Resolution:
     slope: float
     largest: float
 
+    def scaled(self, size: float) -> Resolution:
+        """The same number of samples on a surface of another size."""
+        return replace(self, spacing=size * self.spacing)
+
     def beside(self, points: Floats, faces: Ints) -> Resolution:
         """Coarser, up to twice, at a surface whose edges are all long: a box needs no fine samples on its sides."""
         edges = sides(faces)

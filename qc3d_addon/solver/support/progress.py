@@ -77,6 +77,27 @@ class Progress(NamedTuple):
         return f"{label} ({self.fit + 1} of {self.fits})" if self.fits > 1 and self.stage in FIT_STAGES else label
 
 
+class Done(NamedTuple):
+    """How far a run is.
+
+    Parameters
+    ----------
+    ended, tasks : int
+        Tasks that have ended, and all.
+    overall : float
+        Finished share of all the work, 0..1; it never decreases.
+    """
+
+    ended: int
+    tasks: int
+    overall: float
+
+    @property
+    def label(self) -> str:
+        """What is being done, in words."""
+        return f"{self.ended} of {self.tasks} keys done"
+
+
 Steps = Generator[Progress, None, T]
 
 

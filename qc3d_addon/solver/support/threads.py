@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,20 +18,42 @@ Result = TypeVar("Result")
 
 # Beyond four threads, the GIL and the memory bandwidth leave nothing to gain.
 _MOST_THREADS = 4
+_this_thread = threading.local()
 
 
 def thread_count() -> int:
-    """Number of pieces of work that run at once: the cores available to this process, at most four."""
+    """Number of pieces of work that run at once: the cores available to this process, at most four.
+
+    It is 1 in a thread that is ``alone``.
+    """
+    if getattr(_this_thread, "is_alone", False):
+        return 1
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(cores, _MOST_THREADS)
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """Context manager that lets this thread work by itself, because others beside it keep the cores busy."""
+    _this_thread.is_alone = True
+    try:
+        yield
+    finally:
+        _this_thread.is_alone = False
 
 
 @contextmanager
 def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
     """Context manager that runs ``work`` in another thread during its block, and gives its future.
 
-    Leaving the block waits for the work, unless it is left by an exception.
+    Leaving the block waits for the work, unless it is left by an exception. Where threads would not help, the work is
+    done first.
     """
+    if thread_count() == 1:
+        done: Future[Result] = Future()
+        done.set_result(work())
+        yield done
+        return
     pool = ThreadPoolExecutor(1)
     try:
         yield pool.submit(work)

@@ -45,10 +45,11 @@ def tangent_bases(positions: Floats, faces: Ints) -> Floats:
 
 def hat_gradients(positions: Floats, faces: Ints, bases: Floats) -> Floats:
     """(m, 3, 2) gradients of the three hat functions of each triangle, in its tangent basis (m, 3, 3)."""
-    edges = np.stack(
-        [positions[faces[:, 1]] - positions[faces[:, 0]], positions[faces[:, 2]] - positions[faces[:, 0]]], axis=2
-    )
-    inner = np.linalg.inv(bases[:, :, :2].transpose(0, 2, 1) @ edges)
+    first, second = (positions[faces[:, corner]] - positions[faces[:, 0]] for corner in (1, 2))
+    # The inverse of the matrix with the columns (a, c) and (b, d), the two edges in the tangent basis.
+    (a, c), (b, d) = (np.einsum("mij,mi->jm", bases[:, :, :2], edge) for edge in (first, second))
+    inner = np.stack([d, -b, -c, a], axis=1) / (a * d - b * c)[:, None]
+    inner = inner.reshape(-1, 2, 2)
     return np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
 
 

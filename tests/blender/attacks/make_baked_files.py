@@ -15,7 +15,7 @@ import numpy as np
 import qc3d_addon
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.run import bake_object
-from qc3d_addon.solver.fit import fit_pair
+from qc3d_addon.solver.fit import volume
 from qc3d_addon.solver.settings import FrameOptions
 
 from ..conftest import six_tetrahedra
@@ -37,7 +37,7 @@ def main() -> None:
         key = obj.shape_key_add(name=name, from_mix=False)
         key.value = 0.0
         key.points.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
-    fit_pair.fill_cube = lambda *_: six_tetrahedra()  # so that the maps are small
+    volume.fill_cube = lambda *_, **__: six_tetrahedra()  # so that the maps are small
     options = FrameOptions(mode="linear")
     way = ("Basis", "Lean.L")
     bake_object(obj, BakeRequest(way, 3, frame_options=options, keyframes=(1, 25), play_on="slider"))

@@ -22,7 +22,8 @@ import pytest
 from qc3d_addon.blender import live_scrub
 from qc3d_addon.blender.bake import map_files
 from qc3d_addon.blender.bake import plan as plans
-from qc3d_addon.blender.bake.plan import Plan, plan_bake, plan_maps, plan_preview
+from qc3d_addon.blender.bake.plan import Plan, plan_bake, plan_maps
+from qc3d_addon.blender.bake.plan_again import plan_preview
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.chains import absolute_copy, alembic, keyframes, mirror, remove
 from qc3d_addon.blender.heat_map import heat_map

@@ -14,6 +14,7 @@ from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.collision.crossings import CrossingSearch
 from qc3d_addon.solver.combinations.base import KeysOnBase
 from qc3d_addon.solver.combinations.composer import Composer
+from qc3d_addon.solver.settings import Mirror
 from qc3d_addon.solver.support.progress import Progress
 
 from .arm import arm, posed
@@ -188,3 +189,25 @@ def test_width_and_height_of_a_box_multiply() -> None:
     assert abs(found.shape - both).max() < 1e-9
     [verdict] = qc3d.judge_pairs(corners, [corners * [2.0, 1.0, 1.0], corners * [1.0, 1.0, 1.5]], faces)
     assert verdict.adding_is_right
+
+
+@pytest.mark.parametrize("mirror", ["auto", "z"])
+def test_a_half_is_combined_as_the_mirrored_whole(mirror: Mirror) -> None:
+    upper = (REST[FACES][:, :, 2] > -1e-9).all(axis=1)
+    used, faces = np.unique(FACES[upper], return_inverse=True)
+    raised = posed(REST, 60.0, 0.0)
+    swell = REST + np.exp(-((REST[:, :1] - 1.1) ** 2) / 0.1) * REST * [0.0, 0.8, 0.8]
+    whole = qc3d.combine(REST, [raised, swell], FACES).shape
+    half = [shape[used] for shape in (REST, raised, swell)]
+    found = qc3d.combine(half[0], half[1:], faces.reshape(-1, 3), mirror=mirror).shape
+    alone = qc3d.combine(half[0], half[1:], faces.reshape(-1, 3), mirror="none").shape
+    seam = np.abs(half[0][:, 2]) < 1e-9
+    assert seam.sum() > 20
+    assert np.abs(found[seam, 2]).max() < 1e-12 < np.abs(alone[seam, 2]).max()
+    # The other half of the arm is triangulated another way than the image of this one.
+    assert off(found, whole[used]) < 0.1 * off(raised[used] + swell[used] - half[0], whole[used])
+
+
+def test_an_unknown_mirror() -> None:
+    with pytest.raises(qc3d.InputError, match="Unknown mirror 'w'"):
+        qc3d.combine(REST, [posed(REST, 60.0, 0.0), REST], FACES, mirror="w")  # type: ignore[arg-type]

@@ -69,7 +69,7 @@ def test_a_bar_that_is_twisted() -> None:
     fitted = finish(fit_pair(KeyPair.checked(points, twisted(points, 90.0), faces), EXACT))
     assert_met(fitted)
     # The bar's ends turn by 90 degrees against one another: the branch is the one that leads there.
-    assert 40.0 < np.degrees(np.linalg.norm(fitted.turns[fitted.insideness > 0.5], axis=1)).max() < 120.0
+    assert 40.0 < np.degrees(np.linalg.norm(fitted.turns[fitted.volume.insideness > 0.5], axis=1)).max() < 120.0
 
 
 def test_a_ball_with_bumps(bumpy: FittedMap) -> None:

@@ -172,13 +172,14 @@ class TestWrongContents:
 
     def test_another_version(self) -> None:
         header = {**contents(STORED)["header"], "version": 99}
-        self.refused("has format 99, this version reads 3; fit the keys", header=header)
+        self.refused("has format 99, this version reads 4; fit the keys", header=header)
 
     @pytest.mark.parametrize(
         ("version", "said"),
         [
             (FORMAT_VERSION, None),
-            (FORMAT_VERSION - 1, "was made by an earlier version of QC3D"),
+            (FORMAT_VERSION - 1, None),
+            (FORMAT_VERSION - 2, "was made by an earlier version of QC3D"),
             (FORMAT_VERSION + 1, "was made by a later version of QC3D"),
             ("1", "is damaged"),
             (None, "is damaged"),

@@ -10,6 +10,7 @@ import pytest
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.frames.volume_path import VolumePath
 from qc3d_addon.solver.maps.representation import polar_decomposition
+from qc3d_addon.solver.maps.volume_system import VolumeSystem
 from qc3d_addon.solver.numerics.rotation_unwrapping import Turning
 from qc3d_addon.solver.numerics.rotations import rotation_matrices, rotation_vectors
 from qc3d_addon.solver.settings import StretchLaw
@@ -22,7 +23,7 @@ from ..meshes import jittered_grid, kuhn_grid
 def path_of(mesh: TetMesh, values: Floats, inside: Floats, law: StretchLaw = "linear") -> VolumePath:
     turns = rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation)
     maps = np.stack([mesh.points, values])
-    return VolumePath(mesh, maps, Turning(turns, np.zeros_like(turns)), insideness(inside), law)
+    return VolumePath(VolumeSystem(mesh, insideness(inside)), maps, Turning(turns, np.zeros_like(turns)), law)
 
 
 def whirled(points: Floats, angle: float) -> Floats:
@@ -91,7 +92,8 @@ def test_a_twist_by_whole_turns_ends_where_none_does(turns: int) -> None:
     twist = np.where(core[:, None], (0.7 + 2.0 * np.pi * turns) * axis, 0.0)
     swing = rotation_vectors(rotations @ rotation_matrices(-twist))
     maps = np.stack([mesh.points, values])
-    path = VolumePath(mesh, maps, Turning(swing, twist), insideness(core.astype(np.float64)), "linear")
+    system = VolumeSystem(mesh, insideness(core.astype(np.float64)))
+    path = VolumePath(system, maps, Turning(swing, twist), "linear")
     np.testing.assert_allclose(path.at(0.0), mesh.points, rtol=0.0, atol=1e-11)
     np.testing.assert_allclose(path.at(1.0), values, rtol=0.0, atol=1e-11)
     middle = np.linalg.norm(mesh.points - 0.5, axis=1) < 0.1
@@ -115,7 +117,8 @@ def test_the_maps_fitted_on_the_way_are_met_and_shared_between() -> None:
     # Some way that interpolation does not take.
     bump = 0.01 * np.sin(np.pi * mesh.points) * ~mesh.on_cube_face
     maps = np.stack([mesh.points, whirled(mesh.points, 0.3) + bump, whirled(mesh.points, 0.6) - bump, values])
-    path = VolumePath(mesh, maps, Turning(turns, np.zeros_like(turns)), insideness(np.ones(len(mesh.tets))), "linear")
+    system = VolumeSystem(mesh, insideness(np.ones(len(mesh.tets))))
+    path = VolumePath(system, maps, Turning(turns, np.zeros_like(turns)), "linear")
     for step, fitted in enumerate(maps):
         np.testing.assert_allclose(path.followed(step / 3, path.at(step / 3)), fitted, rtol=0.0, atol=1e-11)
     missed = [fitted - path.at(step / 3) for step, fitted in enumerate(maps)]

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Combinations of meshes that are only one half: computed for the mirrored whole; the seam stays on its plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..keys.halves import MirrorPlane, Whole, mirror_planes
+from ..settings import FitOptions, Mirror
+from ..support.progress import Steps
+from .base import KeysOnBase
+from .combine import Combination, combine
+
+
+class MirroredShapes:
+    """Shapes of a mesh with their mirror images.
+
+    Parameters
+    ----------
+    shapes : sequence of (n, 3)
+    faces, edges, polygons : (m, 3), (e, 2), (m,) int64
+        As of a ``KeyPair``.
+    planes : sequence of MirrorPlane
+        Without any, the shapes are as they are given.
+
+    Attributes
+    ----------
+    shapes : tuple of (w, 3)
+        Shapes of the whole, starting with the mesh's own vertices.
+    faces, edges : (m, 3), (e, 2)
+        Triangles of the whole, and its edges without a triangle.
+    """
+
+    def __init__(
+        self, shapes: Sequence[Floats], faces: Ints, edges: Ints, polygons: Ints, planes: Sequence[MirrorPlane]
+    ) -> None:
+        self._count = len(shapes[0])
+        self._seams = [
+            (plane, np.all([np.abs(plane.heights(shape)) <= plane.reach for shape in shapes], axis=0))
+            for plane in planes
+        ]
+        whole = Whole(tuple(shapes), faces, edges, polygons)
+        for plane in planes:
+            whole = whole.mirrored(plane)
+        self.shapes, self.faces, self.edges = whole.shapes, whole.faces, whole.edges
+
+    def own(self, shape: Floats) -> Floats:
+        """(n, 3) the mesh's own part of a shape (w, 3) of the whole, with its seam on the planes."""
+        half = shape[: self._count]
+        for plane, on_plane in self._seams:
+            half = plane.raised(half, np.where(on_plane, -plane.heights(half), 0.0))
+        return half
+
+
+def combine_halves(
+    keys: KeysOnBase,
+    mirror: Mirror,
+    weights: Sequence[float] | None = None,
+    order: Sequence[int] | None = None,
+    options: FitOptions | None = None,
+) -> Steps[Combination]:
+    """``combine`` keys of a mesh that may be only one half.
+
+    Parameters
+    ----------
+    mirror : Mirror
+        The axes to mirror across, or how to find them, see ``mirror_planes``.
+    keys, weights, order, options
+        See ``combine``.
+
+    Raises
+    ------
+    InputError
+        As ``combine``, or if the choice of ``mirror`` is unknown.
+    """
+    first = keys.pairs[0]
+    shapes = [keys.base, *(pair.key1 for pair in keys.pairs)]
+    planes = mirror_planes(mirror, {str(number): shape for number, shape in enumerate(shapes)}, first.faces)
+    if not planes:
+        return (yield from combine(keys, weights, order, options))
+    mesh = MirroredShapes(shapes, first.faces, first.edges, first.polygons, planes)
+    base, *others = mesh.shapes
+    made = yield from combine(KeysOnBase(base, others, mesh.faces, mesh.edges), weights, order, options)
+    return replace(made, shape=mesh.own(made.shape))

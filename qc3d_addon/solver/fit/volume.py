@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The volume around the first key of a pair, with all that follows from it, whatever the second key is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from ..arrays import Floats, Ints
+from ..keys.embedding import ROOM, Cube, Embedding
+from ..maps.volume_system import VolumeSystem
+from ..meshing.cube import fill_cube
+from ..settings import FitOptions
+from ..tets.mesh import TetMesh
+from ..tets.point_location import interpolation_matrix
+from ..triangles.winding_number import insideness, winding_numbers
+from .fold_free import FoldFreeFitter
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """The filled cube around a key. Several pairs of keys share it if they have the same first key in the same cube.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The filled unit cube.
+    engine : str
+        The engine that made the mesh; the option ``auto`` leaves it open.
+    key0 : (n, 3)
+        The first key, cube units.
+    faces : (m, 3) int64
+        Its triangles.
+    weights : (n,)
+        Positive weights of its vertices, with the sum 1.
+    notes : tuple of str
+        Sentences for the user, such as why another engine was used.
+    cube : Cube, optional
+        Where the cube stands, if it is not that of a single pair.
+    """
+
+    mesh: TetMesh
+    engine: str
+    key0: Floats
+    faces: Ints
+    weights: Floats
+    notes: tuple[str, ...] = ()
+    cube: Cube | None = None
+
+    @classmethod
+    def filled(
+        cls, embedding: Embedding, options: FitOptions, cube: Cube | None = None, stretches: Floats | None = None
+    ) -> Volume:
+        """Fill the cube around the first key of an embedded pair.
+
+        Parameters
+        ----------
+        embedding : Embedding
+        options : FitOptions
+        cube : Cube, optional
+            The cube of the embedding, if it is not that of this pair alone.
+        stretches : (n,), optional
+            How many times longer the edges at each vertex become, for the quality ``exact``.
+
+        Raises
+        ------
+        MeshingError
+            If the chosen engine cannot fill it.
+        """
+        key0, faces = embedding.key0, embedding.pair.faces
+        points = key0 if options.quality == "exact" else in_single_precision(key0)
+        made = fill_cube(points, faces, options, stretches, 1.0 if cube is None else 1.0 / ROOM)
+        return cls(made.mesh, made.engine, key0, faces, embedding.weights, made.notes, cube)
+
+    @cached_property
+    def landmarks(self) -> csr_array:
+        """(n, N) barycentric coordinates of the first key's vertices in the mesh."""
+        return interpolation_matrix(self.mesh, self.key0)
+
+    @cached_property
+    def insideness(self) -> Floats:
+        """(M,) weight of each tetrahedron by its winding number: 1 inside the object, small outside."""
+        return insideness(winding_numbers(self.key0, self.faces, self.mesh.centroids))
+
+    @cached_property
+    def system(self) -> VolumeSystem:
+        """The linear system of maps of the mesh."""
+        return VolumeSystem(self.mesh, self.insideness)
+
+    @cached_property
+    def around_landmarks(self) -> tuple[csr_array, csr_array]:
+        """(n, N) and (N, M): averages of the tetrahedra around the mesh's vertices, taken to the first key's vertices.
+
+        Tetrahedra inside the object count before all.
+        """
+        around = csr_array(self.mesh.incidence @ diags_array(self.mesh.volumes * self.insideness))
+        totals = self.landmarks @ around.sum(axis=1)
+        return csr_array(diags_array(1.0 / totals) @ self.landmarks), around
+
+    @cached_property
+    def fitter(self) -> FoldFreeFitter:
+        """Fits maps of the mesh to second keys.
+
+        A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as
+        keys that were moved, must lead to the same map: hence single precision.
+        """
+        rounded = in_single_precision(self.key0)
+        return FoldFreeFitter(self.mesh, interpolation_matrix(self.mesh, rounded), in_single_precision(self.weights))
+
+
+def in_single_precision(values: Floats) -> Floats:
+    """Values rounded to single precision."""
+    return np.asarray(values, dtype=np.float32).astype(np.float64)

@@ -74,7 +74,9 @@ def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme:
     assert 0.0 < told["transfer_error"][0] < 0.05
 
 
-@pytest.mark.parametrize("amount", [["--error", "0.01"], ["--error", "1e-4"], ["--size", "900"]])
+@pytest.mark.parametrize(
+    "amount", [["--error", "0.01"], ["--error", "1e-4"], pytest.param(["--size", "900"], marks=pytest.mark.slow)]
+)
 def test_the_smallest(source: Path, tmp_path: Path, amount: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     file, report, output = tmp_path / "map.qc3d", tmp_path / "report.json", tmp_path / "restored.npz"
     command = ["compress", str(source), *amount, "--output", str(file), "--report", str(report)]
@@ -99,7 +101,8 @@ def test_the_smallest(source: Path, tmp_path: Path, amount: list[str], capsys: p
 
 @pytest.mark.parametrize("boundary", ["auto", "fixed", "exact"])
 @pytest.mark.parametrize("scheme", ["smallest", "published", "logarithm"])
-def test_a_mesh_that_is_no_cube(mesh: TetMesh, tmp_path: Path, boundary: str, scheme: str) -> None:
+def test_a_mesh_that_is_no_cube(tmp_path: Path, boundary: str, scheme: str) -> None:
+    mesh = jittered_grid(4, seed=0)
     points = 30.0 * mesh.points + 5.0
     values = points + 2.0 * np.sin(points[:, [1, 2, 0]] / 10.0)
     write_tets(tmp_path / "map.npz", TetFile(points, mesh.tets, {TARGET: values}))
@@ -115,14 +118,13 @@ def test_a_mesh_that_is_no_cube(mesh: TetMesh, tmp_path: Path, boundary: str, sc
         np.testing.assert_array_equal(found[rows], values[rows])
     else:
         assert 0.0 < told["boundary_error"][0] < 0.05 * np.ptp(points)
-        assert told["bytes"] < told["raw_bytes"] / 5
+        assert told["bytes"] < told["raw_bytes"] / 3
 
 
 @pytest.mark.parametrize("scheme", ["smallest", "published", "logarithm", "fitted"])
 @pytest.mark.parametrize("boundary", ["auto", "fixed", "exact"])
-def test_two_parts_and_a_point_of_no_tetrahedron(
-    mesh: TetMesh, tmp_path: Path, scheme: str, boundary: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_parts_and_a_point_of_no_tetrahedron(tmp_path: Path, scheme: str, boundary: str) -> None:
+    mesh = jittered_grid(3, seed=0)
     points = np.concatenate([mesh.points, mesh.points + 2.0, [[5.0, 5.0, 5.0]]])
     tets = np.concatenate([mesh.tets, mesh.tets + len(mesh.points)])
     write_tets(tmp_path / "map.npz", TetFile(points, tets, {TARGET: 1.01 * points}))

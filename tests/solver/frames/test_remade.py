@@ -40,7 +40,8 @@ class TestSettings:
         "settings",
         [
             Settings((0, 3)),
-            Settings((0, 2, 5), (0.0, 0.1, 0.5, 0.7, 0.9, 1.0), FitOptions(seed=3), FrameOptions("linear", "ease-in", (0.3,))),
+            Settings((0, 2), (0.0, 0.1, 1.0), FitOptions(seed=3), FrameOptions("linear", "ease-in")),
+            Settings((0, 2, 5), frame_options=FrameOptions(via_at=(0.3,))),
         ],
     )
     def test_there_and_back(self, settings: Settings) -> None:

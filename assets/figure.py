@@ -35,6 +35,7 @@ def build_figure() -> None:
     carry_tongue(rig, -figure_head.JAW)
     animate(rig)
     add_studio()
+    bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = bpy.data.objects["Arm"]
     bpy.data.objects["Arm"].select_set(True)
 
@@ -57,6 +58,7 @@ def add_mesh(name: str, points: Floats, faces: Ints, materials: tuple[str, ...],
         key = obj.shape_key_add(name=key_name, from_mix=False)
         key.value = 0.0
         key.points.foreach_set("co", _snapped(shape).astype(np.float32).ravel())
+    obj.active_shape_key_index = 1 if keys else 0  # the panel takes it for the key to bake
     return obj
 
 
@@ -69,7 +71,10 @@ def _face() -> bpy.types.Object:
     points, faces = figure_head.head()
     paint = figure_head.colors(points)
     keys = {"Jaw": figure_head.jaw(points), "Brows": figure_head.forehead_up(points)}
-    face = add_mesh("Face", points + HEAD, faces, ("Skin",), keys={name: key + HEAD for name, key in keys.items()})
+    shades = np.array([figure_head.SKIN, figure_head.LIP, figure_head.MOUTH])
+    nearest = np.linalg.norm(paint[faces].mean(axis=1)[:, None] - shades, axis=2).argmin(axis=1)
+    moved = {name: key + HEAD for name, key in keys.items()}
+    face = add_mesh("Face", points + HEAD, faces, ("Skin", "Lips", "Mouth"), nearest, moved)
     attribute = face.data.color_attributes.new("Paint", "BYTE_COLOR", "POINT")
     attribute.data.foreach_set("color", np.c_[paint, np.ones(len(paint))].astype(np.float32).ravel())
     return face

@@ -9,7 +9,7 @@ from clay import Floats, Ints, ball, joined, rod, surface
 from motions import swept, turned
 
 SHOULDER, HANG = np.array([0.37, 0.05, 0.66]), np.radians(22.0)  # where the arm starts, and how far it hangs down
-ELBOW = (0.30, 0.58)  # the bend's range along the arm
+ELBOW = (0.18, 0.66)  # the bend's range along the arm
 CUFF = (0.745, 0.835)  # the sleeve's end
 _FINGERS = (1.05, 1.30)  # the range along the arm in which fingers curl
 
@@ -20,8 +20,8 @@ def arm(step: float = 0.0166) -> tuple[Floats, Ints]:
 
 
 def bent(points: Floats) -> Floats:
-    """The elbow bent by 115 degrees, the palm turned to the front."""
-    return swept(points, (0.0, 0.0, 0.0), np.radians(115.0), ELBOW, np.radians(-90.0), (0.42, 0.95))
+    """The elbow bent by 105 degrees, the palm turned to the front."""
+    return swept(points, (0.0, 0.0, 0.0), np.radians(105.0), ELBOW, np.radians(-90.0), (0.42, 0.95))
 
 
 def fist(points: Floats) -> Floats:
@@ -56,8 +56,8 @@ def collar() -> tuple[Floats, Ints]:
 
 
 def _arm(points: Floats) -> Floats:
-    shape = rod(points, (0.0, 0.0, 0.0), (0.42, 0.0, 0.0), 0.14, 0.118)
-    shape = joined(shape, rod(points, (0.42, 0.0, 0.0), (0.74, 0.0, 0.0), 0.118, 0.098), 0.05)
+    shape = rod(points, (0.0, 0.0, 0.0), (0.42, 0.0, 0.0), 0.14, 0.104)
+    shape = joined(shape, rod(points, (0.42, 0.0, 0.0), (0.74, 0.0, 0.0), 0.104, 0.096), 0.05)
     ring = rod(points, (0.772, 0.0, 0.0), (0.808, 0.0, 0.0), 0.108, 0.108)
     shape = joined(shape, np.maximum(ring, np.abs(points[:, 0] - 0.79) - 0.045), 0.02)
     hand = joined(rod(points, (0.76, 0.0, 0.0), (0.92, 0.0, 0.0), 0.066, 0.062),

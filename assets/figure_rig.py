@@ -61,6 +61,7 @@ def carry_tongue(rig: bpy.types.Object, angle: float) -> None:
     """Let the bone Tongue turn by an angle, in radians, as the jaw opens."""
     bone = rig.pose.bones["Tongue"]
     bone.rotation_mode = "XYZ"
+    rig.data.bones["Tongue"].hide = True  # nothing to be pulled by hand
     _follow(bone.driver_add("rotation_euler", 0).driver, rig, "Jaw", f"{angle:.4f} * pulled / {REACH}")
 
 

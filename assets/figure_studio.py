@@ -11,6 +11,8 @@ from mathutils import Vector
 # Linear red, green, blue; roughness.
 MATERIALS = {
     "Skin": (figure_head.SKIN, 0.5),
+    "Lips": (figure_head.LIP, 0.5),
+    "Mouth": (figure_head.MOUTH, 0.5),
     "Skin plain": (figure_head.SKIN, 0.5),
     "Lid": ((0.70, 0.32, 0.20), 0.5),
     "Lash": ((0.05, 0.015, 0.03), 0.5),
@@ -23,6 +25,7 @@ MATERIALS = {
     "Cuff": ((0.80, 0.33, 0.04), 0.85),
     "Wood": ((0.30, 0.15, 0.07), 0.5),
 }
+_PAINTED = ("Skin", "Lips", "Mouth")  # by the attribute Paint, where materials are drawn; solid views show their colors
 _LIGHTS = {"Key": ((-2.2, -3.2, 3.6), 1.6, 190.0), "Fill": ((3.2, -2.4, 1.6), 2.2, 50.0),
            "Rim": ((1.6, 2.6, 3.2), 1.4, 240.0)}  # fmt: skip
 _TARGET = Vector((0.26, 0.0, 1.16))
@@ -39,10 +42,10 @@ def material(name: str) -> bpy.types.Material:
     shader = made.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*color, 1.0)
     shader.inputs["Roughness"].default_value = roughness
-    if name in ("Skin", "Skin plain", "Lid", "Tongue"):
+    if name in (*_PAINTED, "Skin plain", "Lid", "Tongue"):
         shader.inputs["Subsurface Weight"].default_value = 0.15
         shader.inputs["Subsurface Radius"].default_value = (0.06, 0.02, 0.01)
-    if name == "Skin":
+    if name in _PAINTED:
         paint = made.node_tree.nodes.new("ShaderNodeVertexColor")
         paint.layer_name = "Paint"
         made.node_tree.links.new(paint.outputs["Color"], shader.inputs["Base Color"])
@@ -55,7 +58,7 @@ def add_studio() -> None:
     for name, (place, size, power) in _LIGHTS.items():
         light = bpy.data.lights.new(name, "AREA")
         light.shape, light.size, light.energy = "DISK", size, power
-        _place(name, light, place)
+        _place(name, light, place).hide_viewport = True
     camera = bpy.data.cameras.new("Camera")
     camera.lens = 64.0
     scene.camera = _place("Camera", camera, (0.5, -5.4, 1.5))
@@ -71,7 +74,8 @@ def add_studio() -> None:
             if area.type == "VIEW_3D":
                 space = area.spaces.active
                 space.region_3d.view_perspective = "CAMERA"
-                space.overlay.show_relationship_lines = False
+                for shown in ("relationship_lines", "floor", "axis_x", "axis_y", "cursor", "object_origins"):
+                    setattr(space.overlay, f"show_{shown}", False)
 
 
 def _place(name: str, data: object, place: tuple[float, float, float]) -> bpy.types.Object:

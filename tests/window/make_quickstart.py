@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Follow the page *The first bake* in a real Blender, and take its pictures.
+"""Follow the page *The first bake* in a real Blender, and take its pictures, and those of two other pages.
 
     QC3D_BLENDER_ROOT=... python -m tests.window.make_quickstart dist/qc3d-VERSION-linux-x64.zip docs/images
 
@@ -15,6 +15,8 @@ import shutil
 import sys
 import time
 from pathlib import Path
+
+from PIL import Image
 
 from .harness import Window, missing
 
@@ -39,9 +41,14 @@ def main(package: Path, pictures: Path) -> None:
             window.press("Escape")
             install(window, pictures, package.name)
             open_demo(window)
+            half_way(window, pictures / "before.png")
+            window.open_sidebar()
             choose(window, pictures)
             bake(window, pictures)
             play(window, pictures)
+            half_way(window, pictures / "after.png")
+            beside(pictures)
+            heat_map(window, pictures)
     finally:
         shutil.rmtree(home)
 
@@ -108,11 +115,41 @@ def bake(window: Window, pictures: Path) -> None:
 def play(window: Window, pictures: Path) -> None:
     """Step 3: the space bar over the 3D view."""
     window.press("space")
-    window.wait_for("bpy.context.scene.frame_current >= 12")
+    window.wait_for("bpy.context.scene.frame_current >= 39")
     window.press("space")
     window.wait_for("not bpy.context.window_manager.windows[0].screen.is_animation_playing")
+    window.ask("bpy.context.scene.frame_set(39)")  # half-way, however fast this machine draws
     time.sleep(SETTLE)
     window.shoot(pictures / "quickstart-play.png", VIEW_AND_STATUS)
+
+
+def half_way(window: Window, path: Path) -> None:
+    """The figure while the bone Bend is half-way up, without the sidebar over it."""
+    window.ask("view()[1].spaces.active.show_region_ui = False")
+    window.ask("bpy.context.scene.frame_set(38)")
+    time.sleep(SETTLE)
+    window.shoot(path, (250, 140, 560, 480))
+
+
+def beside(pictures: Path) -> None:
+    """Before and after the bake in one picture."""
+    halves = [Image.open(pictures / f"{name}.png").convert("RGB") for name in ("before", "after")]
+    width, height = halves[0].size
+    both = Image.new("RGB", (2 * width + 4, height), (255, 255, 255))
+    for number, half in enumerate(halves):
+        both.paste(half, (number * (width + 4), 0))
+        (pictures / f"{('before', 'after')[number]}.png").unlink()
+    both.save(pictures / "on_the_key.png", optimize=True)
+
+
+def heat_map(window: Window, pictures: Path) -> None:
+    """The heat map of the bake, with its legend."""
+    window.open_sidebar()
+    window.push("qc3d.heat_map")
+    window.move(300, 650)
+    window.wait_for("jobs.current() is None and len(bpy.context.active_object.data.color_attributes) > 0")
+    time.sleep(SETTLE)
+    window.shoot(pictures / "heat_map.png", VIEW_AND_STATUS)
 
 
 if __name__ == "__main__":

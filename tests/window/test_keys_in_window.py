@@ -79,7 +79,7 @@ def test_a_bone_drives_the_key_before_and_after(rigged: Window, tmp_path: Path) 
     rigged.wait_for("job() is None")
     names = rigged.ask("names()")
     assert names[:4] == OWN
-    assert "Bend and twist_50" in names
+    assert any(name.startswith("Bend and twist_") for name in names)
     assert drivers[0] in rigged.ask("state()")[5]
     after = {place: np.array(rigged.ask(f"pull({place})")) for place in before}
     rigged.ask("pull(0.5)")

@@ -19,8 +19,9 @@ from ..triangles.topology import without_piles
 from .poisson_disk import RESOLUTIONS, SizeField, sample_cube, thin
 from .slivers import Effort, sliver_free
 
-_SHARE = 0.7  # spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample
+_SHARE = 0.5  # spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample
 _MOST_FINER = 3.0  # where the surface is stretched, the spacing is divided by the root of its stretch, and at most this
+_WIDEST = 0.02  # spacing at the surface where edges are long, cube units
 _NEAREST = 6  # nearest vertices whose mean distance defines the local edge length
 # Much nearer vertices belong to another sheet, across a gap that has to be resolved. Factor on their distance.
 _GAP = 1.6
@@ -62,7 +63,7 @@ def vertex_mesh(points: Floats, faces: Ints, seed: int, stretches: Floats | None
 
 
 def size_around(points: Floats, stretches: Floats) -> SizeField:
-    """The spacing of samples around vertices (n, 3) with stretches (n,), nowhere larger than with ``normal``."""
+    """The spacing of samples around vertices (n, 3) with stretches (n,), at the surface at most 0.02."""
     normal = RESOLUTIONS["normal"]
     places, place = np.unique(points, axis=0, return_inverse=True)
     tree = cKDTree(places)
@@ -80,7 +81,7 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
     def size(positions: Floats) -> Floats:
         far, nearest = (np.asarray(found) for found in tree.query(positions, k=min(4, len(places))))
         graded = (local[nearest] + _SLOPE * far).min(axis=1)
-        coarsest = np.minimum(normal.spacing + normal.slope * far[:, 0], normal.largest)
+        coarsest = np.minimum(_WIDEST + normal.slope * far[:, 0], normal.largest)
         return np.minimum(graded, coarsest, dtype=np.float64)
 
     return size

@@ -14,7 +14,7 @@ from ..settings import Quality
 # Measured by benchmarks/large.py, with a margin; docs/guide/limits.md has the figures.
 _MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0, "exact": 140.0}
 _KB_PER_VERTEX = 4.3  # for each pair: the factors of the surface's matrix, and the frames that are computed at once
-_KB_PER_VERTEX_EXACT = 66.0  # of one fit at a time, whose tetrahedra are as fine as the surface
+_KB_PER_VERTEX_EXACT = 85.0  # of one fit at a time, whose tetrahedra are as fine as the surface
 _BYTES_PER_POSITION = 110.0  # for each vertex in each frame: positions, measures, and temporary arrays
 _MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only counts crossings
 _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress

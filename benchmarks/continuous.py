@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the surface crosses itself at any moment that Blender plays, between the baked positions too.
+
+    python -m benchmarks.continuous [--pairs body:rest:t_pose ...] [--parts 8]
+
+Each pair, the listed ones by default, is baked with the default settings and five in-betweens, in single precision as
+Blender stores them. Between the in-betweens Blender plays straight lines (weights *hats*) or a cubic (weights
+*smooth*), which is divided into straight parts here. Along each part, ``ipctk`` finds every vertex that meets a
+triangle and every edge that meets another: with *hats* without gaps in time, since its continuous test misses nothing
+(Wang et al. 2021, *A Large-scale Benchmark and an Inclusion-based Algorithm for Continuous Collision Detection*). What
+is nearer than its tolerance may count too. Pairs where a key already crosses itself, or beside that, are counted apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time as clock
+from dataclasses import replace
+from itertools import pairwise
+
+import ipctk
+import numpy as np
+
+from qc3d_addon.solver.fit.meeting import crossing_vertices
+from qc3d_addon.solver.frames.task import Task, carry_out
+from qc3d_addon.solver.frames.weights import Weights
+from qc3d_addon.solver.keys.embedding import Embedding
+from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.settings import FitOptions, PlayOptions
+from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.solver.triangles.topology import sides, unique_edges
+
+from .catalogue import Catalogue, Floats, Ints, Pair
+from .report import table
+
+_PARTS = 8  # straight parts between two neighboring in-betweens
+_HEAD = ["pair", "hats", "smooth", "hats, at the keys' own", "smooth, at the keys' own", "CPU s"]
+
+
+def main() -> None:
+    """Print the table, row by row."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", nargs="+")
+    parser.add_argument("--parts", type=int, default=_PARTS)
+    chosen = parser.parse_args()
+    catalogue = Catalogue()
+    pairs = [catalogue.find(text) for text in chosen.pairs or ()] or [pair for pair in catalogue.pairs if pair.listed]
+    print("\n".join(table(_HEAD, []).splitlines()), flush=True)
+    for pair in pairs:
+        print(table(row(pair, chosen.parts), []).splitlines()[0], flush=True)
+
+
+def row(pair: Pair, parts: int) -> list[str]:
+    """The cells of one pair."""
+    faces, first, second = pair.load()
+    checked = KeyPair.checked(first, second, faces)
+    vertices, group = checked.welding
+    own = np.zeros(len(vertices), dtype=bool)
+    own[group[crossing_vertices(Embedding.of(checked))]] = True
+    knots, shapes = baked(pair, faces, first, second)
+    started = clock.process_time()
+    counts = []
+    for weights in (Weights.hats(knots), Weights.smooth(knots)):
+        positions = np.unique(np.concatenate([*np.linspace(knots[:-1], knots[1:], parts + 1), knots]))
+        meeting = meetings(weights.played(shapes, positions)[:, vertices], group[checked.faces])
+        counts.append(own[meeting].any(axis=1))
+    seconds = clock.process_time() - started
+    elsewhere, at_own = ([str(np.count_nonzero(there == where)) for there in counts] for where in (False, True))
+    return [str(pair).replace(":", " "), *elsewhere, *at_own, f"{seconds:.1f}"]
+
+
+def baked(pair: Pair, faces: Ints, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Positions (k,) and shapes (k, n, 3) of the keys and in-betweens, rounded as Blender stores them."""
+    task = Task.of_keys({"a": first, "b": second}, faces, None, ("a", "b"), FitOptions(extra_turns=pair.extra_turns))
+    bake = finish(carry_out(replace(task, play=PlayOptions()))).bake
+    assert bake is not None
+    return bake.times, bake.frames.astype(np.float32).astype(np.float64)
+
+
+def meetings(shapes: Floats, faces: Ints) -> Ints:
+    """(c, 4) vertices of the pairs that meet while a surface moves along straight lines from shape to shape.
+
+    Parameters
+    ----------
+    shapes : (k, n, 3)
+    faces : (m, 3)
+
+    Returns
+    -------
+    (c, 4) int64
+        A vertex and the three of a triangle, or the two ends of both edges; each pair once, however often it meets.
+    """
+    corners, edges = np.asarray(faces, dtype=np.int32), unique_edges(sides(faces)).astype(np.int32)
+    mesh = ipctk.CollisionMesh(np.asfortranarray(shapes[0]), np.asfortranarray(edges), np.asfortranarray(corners))
+    found: set[tuple[int, ...]] = set()
+    for before, after in pairwise(shapes):
+        start, end = np.asfortranarray(before), np.asfortranarray(after)
+        candidates = ipctk.Candidates()
+        candidates.build(mesh, start, end)
+        if candidates.is_step_collision_free(mesh, start, end):
+            continue
+        for one in [*candidates.fv_candidates, *candidates.ee_candidates]:
+            ids = tuple(one.vertex_ids(mesh.edges, mesh.faces))
+            if ids not in found and one.ccd(before[list(ids)].ravel(), after[list(ids)].ravel())[0]:
+                found.add(ids)
+    return np.array(sorted(found), dtype=np.int64).reshape(-1, 4)
+
+
+if __name__ == "__main__":
+    main()

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import sys
 from pathlib import Path
@@ -152,6 +154,15 @@ def machine_limit_mb() -> int:
     except (AttributeError, ValueError, OSError):  # this system does not tell
         return 0
     return int(_SHARE_OF_MACHINE * total / 2**20)
+
+
+def give_back() -> None:
+    """Give memory that was freed back to the system, where its C library can do that (glibc).
+
+    The library keeps it for later, but in pieces of the wrong sizes: after each of many tasks it would hold more.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def peak_memory_mb() -> float | None:

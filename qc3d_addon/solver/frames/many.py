@@ -20,6 +20,7 @@ from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import Ends, KeyPair, require_sizes
 from ..settings import FitOptions
+from ..support.memory import give_back
 from ..support.progress import Done
 from ..support.threads import alone, thread_count
 from .task import Outcome, Task, carry_out
@@ -151,8 +152,8 @@ class Run:
         Notes
         -----
         Pairs with the same first key share a volume if their second key fits into its cube, which is larger than the
-        first key by a quarter. Its tetrahedra are as fine as those of a single bake, but others, so that frames differ
-        from those of a single bake about as much as with another seed.
+        first key by a quarter. Its tetrahedra are as fine as those of a single bake, but others, and so the frames are
+        those of a single bake up to rounding; docs/science/speed.md has the differences.
         """
         bases = _Bases(self.tasks)
         count, units = len(self.tasks), len(self.tasks) + _SHARE_OF_BASE * len(bases.shared)
@@ -209,9 +210,13 @@ def _beside_each_other(
         except BaseException as error:  # raised again where the run was started
             news.put(error)
 
+    def work_and_tidy_up(number: int) -> None:
+        work(number)
+        give_back()
+
     with ThreadPoolExecutor(at_once) as pool:
         for number in range(len(tasks)):
-            pool.submit(work, number)
+            pool.submit(work_and_tidy_up, number)
         try:
             ended = 0
             while ended < len(tasks):

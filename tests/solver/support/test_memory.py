@@ -128,3 +128,18 @@ def test_the_peak_is_that_of_this_process_alone() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert held[-1] == 1.0
     assert 5.0 < float(done.stdout) < 300.0
+
+
+def test_memory_is_given_back_where_that_is_possible(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    class Library:
+        def __init__(self, name: object) -> None:
+            self.malloc_trim = calls.append
+
+    monkeypatch.setattr(memory.ctypes, "CDLL", Library)
+    memory.give_back()
+    assert calls == [0]
+    monkeypatch.setattr(memory.ctypes, "CDLL", lambda _: object())  # a library without that function
+    memory.give_back()
+    assert calls == [0]

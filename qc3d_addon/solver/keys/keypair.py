@@ -32,6 +32,8 @@ _MOST_GROWTH = 1e10  # of the sizes of two keys: beyond it their common scale le
 _SINGLE_STEP = float(np.finfo(np.float32).eps)
 _ROUNDING_STEPS = 8.0
 _MOST_ROUNDING = 3e-3
+# Of the size: what is less far from its place counts as there, so coincident vertices may differ by twice as much.
+_IN_PLACE = 1e-6
 # If a step of single precision exceeds this fraction of a key's size, its shape is visibly damaged.
 _COARSE = 1e-3
 
@@ -291,7 +293,8 @@ def require_sizes(pair: KeyPair) -> None:
 def _rounding(key: Floats) -> float:
     """How far apart coincident vertices of a key may be along an axis."""
     steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
-    return min(steps, _MOST_ROUNDING * float(np.ptp(key, axis=0).max(initial=0.0)))
+    size = float(np.ptp(key, axis=0).max(initial=0.0))
+    return max(min(steps, _MOST_ROUNDING * size), 2.5 * _IN_PLACE * size)
 
 
 def _labels(values: ArrayLike, count: int) -> Ints:

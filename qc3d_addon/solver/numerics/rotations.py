@@ -15,7 +15,9 @@ from ..arrays import Floats
 _NEWTON_STEPS = 20  # a cap; scaled Newton converges in about ten
 _SMALL_ANGLE = 1e-4  # radians; below this the first omitted term of the series, angle^4 / 120, is below rounding
 _NO_ANGLE = 1e-12  # radians; below this the axis is lost to rounding
-_HALF_TURN = 1e-6  # cosines of half the angle below this belong to half turns, up to rounding in single precision
+# Cosines of half the angle below this belong to half turns: what a page turns by is never so exact that a change of its
+# keys by a millionth of the size may choose its way.
+_HALF_TURN = 1e-4
 _HALF_TURN_SIDE = np.array([0.83, 0.46, 0.31])  # perpendicular to none of the axes that symmetric shapes turn about
 
 
@@ -87,7 +89,7 @@ def rotation_vectors(rotations: Floats) -> Floats:
     """(k, 3) rotation vectors, axis times angle in radians, of rotation matrices (k, 3, 3); angles are in [0, pi].
 
     Of the two vectors of a half turn always the same one is returned, whatever the rounding; its angle may exceed pi by
-    2e-6.
+    2e-4.
     """
     quaternions = _quaternions(rotations)
     vector, scalar = quaternions[:, 1:], quaternions[:, 0]

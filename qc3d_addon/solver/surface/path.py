@@ -40,6 +40,9 @@ from .tangents import tangents_of
 ANCHOR_WEIGHT = 5e-5
 # What travels a hundredth of the size or more is not drawn to its line at all.
 _NO_LINE = (NEARLY_STILL / 1e-2) ** 2
+# Of still vertices, those around which triangles turn further than this come back after a full turn. Half a turn, as of
+# a page about its still spine, must not be decided by rounding.
+_RETURNS = 1.5 * np.pi
 SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
@@ -112,7 +115,7 @@ class SurfacePath:
         turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, self.rest)
         returned = np.zeros(count, dtype=bool)
         if free_after_turns:
-            returned[usable.faces[turning.angles_from(self.rest) > np.pi]] = True
+            returned[usable.faces[turning.angles_from(self.rest) > _RETURNS]] = True
             still &= ~returned
         self.still = still[self._group]
         self._free = ~still

@@ -10,8 +10,10 @@ from ..arrays import Bools, Floats, Ints
 from .geometry import face_normals
 from .topology import among, distinct, face_adjacency
 
-_FLAT = 1e-5  # sine of the largest angle between the triangles of a flat face: far above rounding in single precision
-_LONGER = 1e-6  # relative; squared lengths that differ by less are equal
+# Sine of the largest angle between the triangles of a flat face, and relative difference of equal squared lengths: far
+# above what changes of a millionth of the size make of flat faces and equal sides.
+_FLAT = 3e-4
+_LONGER = 1e-3
 # A polygon has fans from at most this many corners, evenly spaced: a disk with a thousand corners would otherwise need
 # a million triangles.
 _MOST_FANS = 16

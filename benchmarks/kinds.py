@@ -33,9 +33,9 @@ def plate(cells: tuple[int, int]) -> tuple[Floats, Ints]:
 
 def box(size: tuple[float, float, float]) -> tuple[Floats, Ints]:
     """A box around the origin: corners (8, 3) and triangles (12, 3)."""
-    corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * size
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-    return corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * np.asarray(size, dtype=np.float64)
+    quads: Ints = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return np.asarray(corners, dtype=np.float64), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def joined(parts: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:

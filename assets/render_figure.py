@@ -17,6 +17,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from figure_rig import REACH
 from PIL import Image, ImageDraw, ImageFont
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -63,7 +64,7 @@ def shot(value: float, straight: bool, percentage: int, samples: int, folder: st
     """(height, width, 3) uint8: the figure with the keys at one value."""
     rig = bpy.data.objects["Rig"]
     for _, key, _ in BAKES:
-        rig.pose.bones[key].location[1] = 0.2 * value
+        rig.pose.bones[key].location[1] = REACH * value
     for obj, key, _ in BAKES:
         for block in bpy.data.objects[obj].data.shape_keys.key_blocks:
             if block.name.startswith(f"{key}_"):

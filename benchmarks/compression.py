@@ -1,90 +1,142 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compression of maps: bytes, folds and errors of the schemes and of quantized coordinates, as Markdown tables.
+"""Bytes of maps and frames at equal error, by QC3D and by other ways, as Markdown tables.
 
-    python -m benchmarks.compression --data FOLDER
+    pip install "qc3d[benchmark]"
+    python -m benchmarks.compression --data FOLDER [--errors 1e-3]
 
-FOLDER contains head.npz and body.npz. The frames of a chain are read from a FRAMES.npz of ``qc3d interpolate``, if
-given.
+FOLDER contains head.npz, body.npz and horse.npz.
 """
 
 from __future__ import annotations
 
 import argparse
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
-from qc3d_addon.solver.compression import frames as frame_compression
+from benchmarks.rivals import Rivals
+from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.compression.codec import Codec, Scheme
 from qc3d_addon.solver.compression.files import Packer, Source
-from qc3d_addon.solver.compression.search import Choice, Compressor
-from qc3d_addon.solver.errors import InputError, ReconstructionError
+from qc3d_addon.solver.compression.pack import Small, diagonal_of, small_frames, small_maps
+from qc3d_addon.solver.compression.search import Compressor
+from qc3d_addon.solver.errors import ReconstructionError
+from qc3d_addon.solver.frames.key_times import KeyTimes
+from qc3d_addon.solver.frames.remade import Settings, small_bake
+from qc3d_addon.solver.frames.task import Task, carry_out
+from qc3d_addon.solver.keys.files import read_pairs
+from qc3d_addon.solver.settings import FrameOptions
+from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
 
 ERRORS = (1e-2, 3e-3, 1e-3, 1e-4)
-MODES = 300
-PLAIN: tuple[Scheme, ...] = ("published", "logarithm", "fitted")
-COUNTS = (16, 60)
+COUNTS = (16, 60)  # of modes
+HORSE = shapes.Pose("horse.npz", "", "bind", "Gallop_0", "y")
+MAPS = (shapes.DATA_FACES[1], shapes.DATA_BODIES[2], HORSE)
+CHAINS = ((("rest", "arms_overhead"), 24), (("rest", "t_pose", "arms_overhead"), 3))
+
+OfError = Callable[[float], Small]
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, metavar="FOLDER")
-    parser.add_argument("--frames", type=Path, metavar="FRAMES.npz")
+    parser.add_argument("--errors", type=float, nargs="+", default=ERRORS, metavar="E")
     arguments = parser.parse_args()
-    print("| what | error | modes | remainder | bytes | of raw | quantised + deflate | ratio | folds | theirs |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for pose in (shapes.DATA_FACES[1], shapes.DATA_BODIES[2]):
+    wanted = arguments.errors
+    for pose in MAPS:
         fitted = shapes.fitted(shapes.read(pose, arguments.data))
         mesh, targets = fitted.mesh, fitted.mapped[None]
-        packer = Packer(Source("maps", mesh.points, mesh.tets), MODES)
-        compressor = Compressor(Codec(mesh, MODES), targets, packer)
-        _print_errors(pose.label, compressor)
-        for scheme in PLAIN:
-            searched = Compressor(Codec(mesh, MODES, scheme), targets, packer)
-            for modes in COUNTS:
-                try:
-                    _print_row(f"{pose.label}, {scheme}, modes alone", searched, searched.with_modes(modes))
-                except ReconstructionError:
-                    print(f"| {pose.label}, {scheme}, {modes} modes alone | no map |", flush=True)
-    if arguments.frames is not None:
-        with np.load(arguments.frames, allow_pickle=False) as archive:
-            frames, faces = archive["frames"], archive["faces"].astype(np.int64)
-        searched = frame_compression.compressor(frames, faces, MODES)
-        _print_errors("frames", searched)
-        for modes in COUNTS:
-            _print_row("frames, fitted, modes alone", searched, searched.with_modes(modes))
+        ways: dict[str, OfError] = {"**QC3D**": partial(_small_map, mesh, targets)}
+        _print(f"map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways, wanted)
+        _print_named(mesh, targets)
+    for through, between in CHAINS:
+        frames, faces, settings, polygons = _baked(arguments.data / "body.npz", through, between)
+        ways = {
+            "**QC3D**": partial(_small_bake, frames, faces, settings, polygons),
+            "QC3D, scheme stored": partial(_small_frames, frames, faces),
+        }
+        _print(f"{len(frames) - 1} frames, {' → '.join(through)}", frames[0], frames[1:], ways, wanted)
 
 
-def _print_errors(label: str, compressor: Compressor) -> None:
-    identity = compressor.with_modes(0).error
-    for error in ERRORS:
-        if error >= identity:
-            continue  # nothing need be stored
-        try:
-            _print_row(label, compressor, compressor.with_error(error))
-        except InputError as reason:
-            print(f"| {label} | {error:.0e} | {reason} |", flush=True)
+def _small_map(mesh: TetMesh, targets: Floats, error: float) -> Small:
+    return finish(small_maps(mesh, targets, error))
 
 
-def _print_row(label: str, compressor: Compressor, choice: Choice) -> None:
-    raw = 4 * compressor.targets.size
-    quantised = compressor.quantised_coordinates(choice.error)
-    cells = (
-        label,
-        f"{choice.error:.1e}",
-        choice.compressed.numbers.shape[1],
-        "no" if choice.compressed.remainder is None else "yes",
-        choice.size,
-        f"1 : {raw / choice.size:.0f}",
-        len(quantised.data),
-        f"{len(quantised.data) / choice.size:.2f}",
-        sum(choice.folds),
-        sum(quantised.folds) if quantised.folds else "–",
-    )
-    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+def _small_bake(frames: Floats, faces: Ints, settings: Settings, polygons: Ints, error: float) -> Small:
+    return finish(small_bake(frames, faces, error, settings, polygons))
+
+
+def _small_frames(frames: Floats, faces: Ints, error: float) -> Small:
+    return finish(small_frames(frames, faces, error))
+
+
+def _baked(path: Path, through: Sequence[str], between: int) -> tuple[Floats, Ints, Settings, Ints]:
+    pairs = read_pairs(path, through)
+    times = KeyTimes.of(FrameOptions(), len(through) - 1).between(between)
+    task = Task(pairs, tuple(through), times=times)
+    bake = finish(carry_out(task)).bake
+    assert bake is not None
+    settings, pair = Settings.of_task(task, bake.frames), next(iter(pairs.values()))
+    assert settings is not None
+    return bake.frames, pair.faces, settings, pair.polygons
+
+
+def _print(label: str, points: Floats, targets: Floats, ways: dict[str, OfError], wanted: Sequence[float]) -> None:
+    unit = diagonal_of(points)
+    moved = targets - points
+    rivals = Rivals(points, moved, unit)
+    still = float(np.sqrt((moved**2).sum(axis=2).mean(axis=1).max())) / unit
+    errors = [error for error in wanted if error < still]  # above it nothing need be stored
+    print(f"\n{label} ({4 * moved.size} bytes raw; {still:.1e} without anything)\n")
+    print("| bytes | " + " | ".join(f"{error:.0e}" for error in errors) + " |")
+    print("|---" * (len(errors) + 1) + "|", flush=True)
+    notes: dict[str, list[str]] = {}
+    for name, way in ways.items():
+        cells = []
+        for error in errors:
+            start = time.process_time()
+            small = way(error)
+            cells.append(f"**{len(small.data)}**" if name.startswith("**") else str(len(small.data)))
+            folds = f", {sum(small.folds)} folds" if small.folds else ""
+            notes.setdefault(name, []).append(f"{small.way}, {time.process_time() - start:.1f} s{folds}")
+        _print_row(name, cells)
+    others = [rivals.sizes(error) for error in errors]
+    for name in others[0]:
+        _print_row(name, ["not installed" if sizes[name] is None else str(sizes[name]) for sizes in others])
+    for name, cells in notes.items():
+        _print_row(f"how, and seconds of one core: {name.strip('*')}", cells)
+
+
+def _print_named(mesh: TetMesh, targets: Floats) -> None:
+    """Modes alone by the schemes that have names, and what the smallest way needs for the same error."""
+    print("\n| scheme, modes | error | bytes | folds | seconds | QC3D at that error | folds |")
+    print("|---|---|---|---|---|---|---|", flush=True)
+    packer = Packer(Source("maps", mesh.points, mesh.tets), max(COUNTS))
+    for scheme in get_args(Scheme):
+        compressor = Compressor(Codec(mesh, max(COUNTS), scheme), targets, packer)
+        for count in COUNTS:
+            start = time.process_time()
+            try:
+                choice = compressor.with_modes(count)
+            except ReconstructionError:
+                _print_row(f"{scheme}, {count}", ["no map"] * 6)
+                continue
+            seconds = time.process_time() - start
+            small = _small_map(mesh, targets, choice.error)
+            cells = [choice.size, sum(choice.folds), f"{seconds:.0f}", len(small.data), sum(small.folds)]
+            _print_row(f"{scheme}, {count}", [f"{choice.error:.1e}", *map(str, cells)])
+
+
+def _print_row(name: str, cells: Sequence[str]) -> None:
+    print("| " + " | ".join([name, *cells]) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -25,17 +25,17 @@ Keys = tuple[Floats, Floats, Ints]
 def plate(cells: tuple[int, int]) -> tuple[Floats, Ints]:
     """A rectangle in the unit square of the xy plane, (n, 3), and its triangles (m, 3)."""
     across, along = np.meshgrid(*(np.linspace(0.0, 1.0, count + 1) for count in cells), indexing="ij")
-    points: Floats = np.stack([across, along, np.zeros_like(across)], axis=2).reshape(-1, 3).astype(np.float64)
+    points = np.stack([across, along, np.zeros_like(across)], axis=2).reshape(-1, 3)
     corner = (np.arange(cells[0])[:, None] * (cells[1] + 1) + np.arange(cells[1])).ravel()
-    quads: Ints = (corner[:, None] + np.array([0, cells[1] + 1, cells[1] + 2, 1])).astype(np.int64)
+    quads = corner[:, None] + np.array([0, cells[1] + 1, cells[1] + 2, 1])
     return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def box(size: tuple[float, float, float]) -> tuple[Floats, Ints]:
     """A box around the origin: corners (8, 3) and triangles (12, 3)."""
-    corners: Floats = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * np.array(size)
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-    return corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * np.asarray(size, dtype=np.float64)
+    quads: Ints = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return np.asarray(corners, dtype=np.float64), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def joined(parts: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:

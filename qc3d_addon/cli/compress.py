@@ -1,37 +1,56 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``qc3d compress`` and ``qc3d decompress``: maps and frames as small files, and back."""
+"""``qc3d compress``: maps and frames as small files."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 
-from ..solver.arrays import Floats, Ints
+from ..solver.arrays import Floats
 from ..solver.compression import frames as frame_compression
 from ..solver.compression.codec import Boundary, Codec, Scheme
-from ..solver.compression.files import Packer, Source, read_compressed
+from ..solver.compression.fields import Space
+from ..solver.compression.files import Packer, Source
+from ..solver.compression.pack import (
+    ChosenBoundary,
+    OfError,
+    Small,
+    diagonal_of,
+    of_size,
+    quantised_size,
+    small_frames,
+    small_maps,
+    without_folds,
+)
 from ..solver.compression.search import Choice, Compressor
 from ..solver.compression.transfer_loss import transferred
 from ..solver.errors import InputError
-from ..solver.files.atomic import replacing, replacing_all, require_writable
-from ..solver.files.npz import open_archive, write_arrays
-from ..solver.keys.keypair import KeyPair
+from ..solver.files.atomic import replacing_all, require_writable
+from ..solver.frames.remade import small_bake
 from ..solver.maps.boundary_conditions import Conditions
-from ..solver.maps.files import TARGET, TetFile, read_tets, require_format, write_tets
+from ..solver.maps.files import TARGET, TetFile, read_tets
 from ..solver.maps.mapping import Mapping
-from ..solver.support.memory import require_memory_for_frames
+from ..solver.support.memory import compression_mb, require_memory_for_compression
+from ..solver.support.progress import Progress, finish
+from ..solver.tets.mesh import TetMesh
 from . import speech
+from .frame_files import FrameFile, holds, read_frame_file
 from .options import output_files, print_notes, whole_number, write_json
+from .progress_bars import StageBars
 
 _MODES = 300
+_SMALLEST, _STORED = "smallest", "stored"
+# Of the boundary of the schemes that have names, where no error is asked for.
+_BOUNDARY_STEP = 1e-4
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add both commands to the others."""
+    """Add the command to the others."""
     compress = commands.add_parser("compress", help="a map, or the frames of a chain, as a small file")
     compress.add_argument(
         "map",
@@ -41,29 +60,38 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     compress.add_argument("--target", type=Path, metavar="FILE", help="the same tetrahedra with their vertices mapped")
     compress.add_argument("--output", type=Path, required=True, metavar="FILE.qc3d")
-    compress.add_argument("--scheme", choices=get_args(Scheme), default="fitted", help="default: fitted")
-    compress.add_argument("--boundary", choices=get_args(Boundary), default="sliding", help="default: sliding")
+    compress.add_argument(
+        "--scheme",
+        choices=(_SMALLEST, _STORED, *get_args(Scheme)),
+        help="smallest: of all that QC3D knows; stored: the same, but frames are never baked again by the reader; the "
+        "others: modes of the representation (default: smallest; with --modes, fitted)",
+    )
+    compress.add_argument(
+        "--boundary",
+        choices=get_args(ChosenBoundary),
+        default="auto",
+        help="of maps. sliding: the faces of the cube stay in themselves; fixed: as near as all else; exact: bit for "
+        "bit (default: auto, sliding where the maps allow it, otherwise fixed)",
+    )
     amount = compress.add_mutually_exclusive_group(required=True)
     amount.add_argument("--modes", type=whole_number, metavar="K", help="the lowest K modes and nothing else")
     amount.add_argument(
         "--error", type=float, metavar="E", help="root mean square error allowed, over the bounding box's diagonal"
     )
     amount.add_argument("--size", type=whole_number, metavar="BYTES", help="of the file")
+    compress.add_argument(
+        "--no-folds", action="store_true", help="with --error, of maps: nearer, where folds would come back otherwise"
+    )
     compress.add_argument("--report", type=Path, metavar="REPORT.json", help="sizes, ratios, errors, folds")
     compress.set_defaults(run=_compress)
 
-    decompress = commands.add_parser("decompress", help="the maps or frames of a small file")
-    decompress.add_argument("file", type=Path, metavar="FILE.qc3d")
-    decompress.add_argument(
-        "mesh", type=Path, metavar="MESH", help="the tetrahedra; for frames an .npz file with faces and key0"
-    )
-    decompress.add_argument("--output", type=Path, required=True, metavar="FILE", help="the mesh with all of it")
-    decompress.set_defaults(run=_decompress)
 
-
-class _Job(NamedTuple):
-    compressor: Compressor
-    packer: Packer
+class _Result(NamedTuple):
+    data: bytes
+    report: dict[str, Any]
+    error: float
+    folds: int
+    way: str
 
 
 def _compress(arguments: argparse.Namespace) -> None:
@@ -71,97 +99,137 @@ def _compress(arguments: argparse.Namespace) -> None:
         raise InputError(f"The error {arguments.error} is not possible; give a number above 0.")
     files = output_files(arguments)
     require_writable(*files, inputs=[arguments.map, arguments.target])
-    job = _frames_job(arguments) if _is_frames(arguments.map) else _maps_job(arguments)
-    choice = _chosen(job.compressor, arguments)
-    data = job.packer.bytes_of(choice.compressed)
-    report = _report(job.compressor, choice, len(data))
+    scheme = arguments.scheme or (_SMALLEST if arguments.modes is None else "fitted")
+    if scheme in (_SMALLEST, _STORED) and arguments.modes is not None:
+        raise InputError(f"The scheme {scheme} chooses its modes itself; give an error or a size, or another scheme.")
+    if arguments.no_folds and (scheme not in (_SMALLEST, _STORED) or arguments.error is None):
+        raise InputError("--no-folds belongs to --error and the schemes smallest and stored; leave it out.")
+    is_frames = holds(arguments.map, "frames")
+    if is_frames and (arguments.target is not None or arguments.boundary != "auto" or arguments.no_folds):
+        raise InputError("Frames have no target, no boundary and no folds to avoid; leave those options out.")
+    if is_frames and scheme in ("published", "logarithm"):
+        raise InputError("Frames are compressed by the schemes smallest, stored and fitted; leave that option out.")
+    with StageBars() as bars:
+
+        def progress(share: float) -> None:
+            bars(Progress("compress", share))
+
+        if scheme in (_SMALLEST, _STORED):
+            result = _small(arguments, scheme, is_frames, progress)
+        else:
+            result = _named(arguments, cast(Scheme, scheme), is_frames, progress)
     with replacing_all(*files) as (output, *report_files):
-        output.write_bytes(data)
+        output.write_bytes(result.data)
         for report_file in report_files:
-            write_json(report_file, report)
+            write_json(report_file, result.report)
+    report = result.report
     speech.say(
-        f"{len(data)} bytes, 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
-        f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {choice.error:.2g}, folds "
-        f"{sum(choice.folds)}"
+        f"{len(result.data)} bytes ({result.way}), 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
+        f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {result.error:.2g}, folds "
+        f"{result.folds}"
     )
+    if result.folds and arguments.error is not None and not is_frames:
+        print_notes([f"{result.folds} tetrahedra come back folded; a smaller error or --no-folds avoids that."])
 
 
-def _chosen(compressor: Compressor, arguments: argparse.Namespace) -> Choice:
+def _small(arguments: argparse.Namespace, scheme: str, is_frames: bool, progress: Callable[[float], object]) -> _Result:
+    """The smallest file by whichever way."""
+    mesh: TetMesh | None = None
+    if is_frames:
+        file = read_frame_file(arguments.map)
+        _announce(file.frames.shape[1], len(file.frames), Space(file.frames[0], file.faces))
+        pack, points, targets = _of_frames(file, scheme), file.frames[0], file.frames[1:]
+    else:
+        mesh, targets = _read_maps(arguments)
+        _announce(len(mesh.points), len(targets), Space(mesh.points, mesh.tets))
+        pack, points = _of_maps(mesh, targets, arguments.boundary), mesh.points
+    if arguments.size is not None:
+        work = of_size(pack, arguments.size)
+    else:
+        work = without_folds(pack, arguments.error) if arguments.no_folds else pack(arguments.error)
+    small = finish(work, progress)
+    return _Result(small.data, _small_report(small, points, targets, mesh), small.error, sum(small.folds), small.way)
+
+
+def _announce(vertices: int, count: int, space: Space) -> None:
+    """Refuse what does not fit into memory, and say how much the rest will take."""
+    require_memory_for_compression(vertices, count, space.most_modes)
+    speech.say(f"needs about {compression_mb(vertices, count, space.most_modes):.0f} MB of memory")
+
+
+def _of_frames(file: FrameFile, scheme: str) -> OfError:
+    settings = file.settings
+    if scheme == _STORED or settings is None:
+        return lambda error: small_frames(file.frames, file.faces, error)
+    return lambda error: small_bake(file.frames, file.faces, error, settings, file.polygons)
+
+
+def _of_maps(mesh: TetMesh, targets: Floats, boundary: ChosenBoundary) -> OfError:
+    return lambda error: small_maps(mesh, targets, error, boundary)
+
+
+def _small_report(small: Small, points: Floats, targets: Floats, mesh: TetMesh | None) -> dict[str, Any]:
+    raw, unit = 4 * targets.size, diagonal_of(points)
+    quantised = quantised_size(targets - points, unit, max(small.error, 1e-12))
+    report: dict[str, Any] = {
+        "bytes": len(small.data),
+        "raw_bytes": raw,
+        "quantised_bytes": quantised,
+        "ratio_to_raw": raw / len(small.data),
+        "ratio_to_quantised": quantised / len(small.data),
+        "way": small.way,
+        "error": small.errors.tolist(),
+        "mean_square_error": ((small.errors * unit) ** 2).tolist(),
+        "folds": list(small.folds),
+    }
+    if mesh is not None:
+        boundary = np.unique(mesh.boundary_faces)
+        report["boundary_error"] = np.abs(small.restored - targets)[:, boundary].max(axis=(1, 2)).tolist()
+    return report
+
+
+def _named(
+    arguments: argparse.Namespace, scheme: Scheme, is_frames: bool, progress: Callable[[float], object]
+) -> _Result:
+    """The modes of the representation, by a scheme that has a name."""
+    compressor = _frames_compressor(arguments) if is_frames else _maps_compressor(arguments, scheme)
+    compressor.progress = progress
     if arguments.modes is not None:
-        return compressor.with_modes(compressor.codec.modes)
-    if arguments.error is not None:
-        return compressor.with_error(arguments.error)
-    return compressor.with_size(arguments.size)
+        choice = compressor.with_modes(compressor.codec.modes)
+    elif arguments.error is not None:
+        choice = compressor.with_error(arguments.error)
+    else:
+        choice = compressor.with_size(arguments.size)
+    data = compressor.packer.bytes_of(choice.compressed)
+    return _Result(data, _report(compressor, choice, len(data)), choice.error, sum(choice.folds), scheme)
 
 
-def _decompress(arguments: argparse.Namespace) -> None:
-    require_writable(arguments.output, inputs=[arguments.file, arguments.mesh])
-    if _holds(arguments.mesh, "key0"):
-        first, faces = _first_frame(arguments.mesh)
-        source = frame_compression.source_of(first, faces)
-        frames = frame_compression.restored(first, read_compressed(arguments.file, source))
-        with replacing(arguments.output) as unfinished:
-            write_arrays(unfinished, {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]})
-        return
-    content = read_tets(arguments.mesh)
-    require_format(arguments.output)
-    print_notes(content.notes)
-    mesh = content.mesh()
-    stored = read_compressed(arguments.file, Source("maps", mesh.points, mesh.tets))
-    codec = Codec(mesh, stored.modes, stored.compressed.scheme, stored.compressed.boundary)
-    values = codec.restore(stored.compressed).transpose(1, 0, 2)
-    target = values[:, 0] if values.shape[1] == 1 else values
-    write_tets(
-        arguments.output, TetFile(mesh.points, mesh.tets, {**content.at_vertices, TARGET: target}, content.at_tets)
+def _maps_compressor(arguments: argparse.Namespace, scheme: Scheme) -> Compressor:
+    mesh, targets = _read_maps(arguments)
+    stays = bool((targets == mesh.points)[:, mesh.on_cube_face].all() and mesh.on_cube_face.any())
+    boundary: Boundary = (
+        "sliding" if arguments.boundary == "sliding" or (arguments.boundary == "auto" and stays) else "fixed"
     )
+    step = 0.0
+    if arguments.boundary != "exact":
+        step = float(np.float32(diagonal_of(mesh.points) * (arguments.error or _BOUNDARY_STEP)))
+    modes = min(_MODES if arguments.modes is None else arguments.modes, len(np.unique(mesh.tets)) - 2)
+    codec = Codec(mesh, modes, scheme, boundary, held_step=step)
+    return Compressor(codec, targets, Packer(Source("maps", mesh.points, mesh.tets), modes))
 
 
-def _maps_job(arguments: argparse.Namespace) -> _Job:
+def _frames_compressor(arguments: argparse.Namespace) -> Compressor:
+    file = read_frame_file(arguments.map)
+    modes = min(frame_compression.MOST_MODES if arguments.modes is None else arguments.modes, _MODES)
+    return frame_compression.compressor(file.frames, file.faces, modes)
+
+
+def _read_maps(arguments: argparse.Namespace) -> tuple[TetMesh, Floats]:
+    """The mesh, and its maps (F, N, 3)."""
     content = read_tets(arguments.map)
     print_notes(content.notes)
     mappings = _mappings(content, arguments.target)
-    mesh = mappings[0].mesh
-    modes = min(_MODES if arguments.modes is None else arguments.modes, len(mesh.points) - 2)
-    codec = Codec(mesh, modes, arguments.scheme, arguments.boundary)
-    packer = Packer(Source("maps", mesh.points, mesh.tets), modes)
-    return _Job(Compressor(codec, np.stack([mapping.values for mapping in mappings]), packer), packer)
-
-
-def _frames_job(arguments: argparse.Namespace) -> _Job:
-    if arguments.scheme != "fitted" or arguments.boundary != "sliding" or arguments.target is not None:
-        raise InputError("Frames are compressed by the scheme fitted with a sliding boundary; leave those options out.")
-    with open_archive(arguments.map, "faces and frames are needed") as archive:
-        header = archive.headers(("frames", "faces"))["frames"]
-        if len(header.shape) != 3 or header.dtype.kind not in "fiu" or not header.rows:
-            raise InputError(f"The frames in {arguments.map} must be numbers of the shape (k, n, 3).")
-        require_memory_for_frames(*header.shape[:2])
-        frames, faces = archive.read(("frames", "faces")).values()
-    # Every frame is a key of a pair with the first, and checked as such.
-    pairs = [KeyPair.checked(frames[0], frame, faces) for frame in frames]
-    positions = np.stack([pair.key1 for pair in pairs])
-    modes = min(frame_compression.MOST_MODES if arguments.modes is None else arguments.modes, _MODES)
-    compressor = frame_compression.compressor(positions, pairs[0].faces, modes)
-    return _Job(compressor, compressor.packer)
-
-
-def _is_frames(path: Path) -> bool:
-    return _holds(path, "frames")
-
-
-def _holds(path: Path, name: str) -> bool:
-    """Whether a file is an archive with an array of that name."""
-    if path.suffix.lower() != ".npz":
-        return False
-    with open_archive(path, "an array of numbers is needed") as archive:
-        return name in archive
-
-
-def _first_frame(path: Path) -> tuple[Floats, Ints]:
-    with open_archive(path, "faces and key0 are needed") as archive:
-        require_memory_for_frames(1, archive.headers(["key0"])["key0"].rows)
-        first, faces = archive.read(("key0", "faces")).values()
-    pair = KeyPair.checked(first, first, faces)
-    return pair.key0, pair.faces
+    return mappings[0].mesh, np.stack([mapping.values for mapping in mappings])
 
 
 def _mappings(content: TetFile, target: Path | None) -> list[Mapping]:

@@ -11,6 +11,7 @@ from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.frames.files import write_frames
 from ..solver.frames.key_times import KeyTimes
 from ..solver.frames.modes import needs_fits
+from ..solver.frames.remade import Settings
 from ..solver.frames.task import Task, carry_out
 from ..solver.keys.files import read_pairs
 from ..solver.settings import FitOptions, FrameOptions
@@ -38,7 +39,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         metavar="PAIR.npz",
         help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3), polygons (m,) where known",
     )
-    add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1")
+    add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1, settings")
     add_mirror(command)
     add_options(command, FrameOptions, FitOptions)
     command.set_defaults(run=_run)
@@ -62,8 +63,9 @@ def _run(arguments: argparse.Namespace) -> None:
     with StageBars() as bars:
         bake = finish(carry_out(task), bars).bake
     assert bake is not None
+    settings = Settings.of_task(task, bake.frames)
     with replacing_all(*files) as (output, *reports):
-        write_frames(output, list(pairs.values()), bake.times, bake.frames)
+        write_frames(output, list(pairs.values()), bake.times, bake.frames, "" if settings is None else settings.text)
         for report in reports:
             write_json(report, bake.report.as_json())
     print_notes(bake.report.notes)

@@ -19,6 +19,8 @@ from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
 
+from ..solver.meshes import jittered_grid, sine_map
+
 
 @pytest.fixture(autouse=True)
 def _few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,8 +50,8 @@ def source(mesh: TetMesh, tmp_path: Path) -> Path:
         (["--modes", "20"], "logarithm"),
         (["--modes", "20"], "fitted"),
         (["--error", "0.03"], "published"),
-        (["--error", "0.001"], "fitted"),
-        (["--size", "1500"], "fitted"),
+        pytest.param(["--error", "0.001"], "fitted", marks=pytest.mark.slow),
+        pytest.param(["--size", "1500"], "fitted", marks=pytest.mark.slow),
     ],
 )
 def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme: str) -> None:
@@ -70,6 +72,83 @@ def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme:
     assert told["ratio_to_quantised"] == told["quantised_bytes"] / told["bytes"]
     assert told["mean_square_error"] == [pytest.approx(3.0 * error**2, rel=1e-6)]
     assert 0.0 < told["transfer_error"][0] < 0.05
+
+
+@pytest.mark.parametrize(
+    "amount", [["--error", "0.01"], ["--error", "1e-4"], pytest.param(["--size", "900"], marks=pytest.mark.slow)]
+)
+def test_the_smallest(source: Path, tmp_path: Path, amount: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    file, report, output = tmp_path / "map.qc3d", tmp_path / "report.json", tmp_path / "restored.npz"
+    command = ["compress", str(source), *amount, "--output", str(file), "--report", str(report)]
+    assert main.main(command) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert main.main(["decompress", str(file), str(source), "--output", str(output)]) == 0
+    told = json.loads(report.read_text())
+    before, after = read_tets(source).mapping(), read_tets(output).mapping()
+    error = np.sqrt(((after.values - before.values) ** 2).sum(axis=1).mean()) / np.sqrt(3.0)
+    assert told["error"] == [pytest.approx(error, rel=1e-6)]
+    assert told["bytes"] == file.stat().st_size < told["quantised_bytes"]
+    assert told["folds"] == [after.folds]
+    assert said[0].startswith("needs about ")
+    assert said[1].startswith(f"{told['bytes']} bytes ({told['way']}), 1 : ")
+    if amount[0] == "--error":
+        assert error <= float(amount[1])
+    else:
+        assert told["bytes"] <= int(amount[1])
+    on_faces = before.mesh.on_cube_face
+    np.testing.assert_array_equal(after.values[on_faces], before.mesh.points[on_faces])
+
+
+@pytest.mark.parametrize("boundary", ["auto", "fixed", "exact"])
+@pytest.mark.parametrize("scheme", ["smallest", "published", "logarithm"])
+def test_a_mesh_that_is_no_cube(tmp_path: Path, boundary: str, scheme: str) -> None:
+    mesh = jittered_grid(4, seed=0)
+    points = 30.0 * mesh.points + 5.0
+    values = points + 2.0 * np.sin(points[:, [1, 2, 0]] / 10.0)
+    write_tets(tmp_path / "map.npz", TetFile(points, mesh.tets, {TARGET: values}))
+    amount = ["--error", "3e-3"] if scheme == "smallest" else ["--modes", "30"]
+    files = ["--output", str(tmp_path / "map.qc3d"), "--report", str(tmp_path / "r.json")]
+    options = ["--scheme", scheme, "--boundary", boundary]
+    assert main.main(["compress", str(tmp_path / "map.npz"), *amount, *options, *files]) == 0
+    arguments = [str(tmp_path / "map.qc3d"), str(tmp_path / "map.npz"), "--output", str(tmp_path / "o.npz")]
+    assert main.main(["decompress", *arguments]) == 0
+    told, found = json.loads((tmp_path / "r.json").read_text()), read_tets(tmp_path / "o.npz").mapping().values
+    rows = np.unique(mesh.boundary_faces)
+    if boundary == "exact":
+        np.testing.assert_array_equal(found[rows], values[rows])
+    else:
+        assert 0.0 < told["boundary_error"][0] < 0.05 * np.ptp(points)
+        assert told["bytes"] < told["raw_bytes"] / 3
+
+
+@pytest.mark.parametrize("scheme", ["smallest", "published", "logarithm", "fitted"])
+@pytest.mark.parametrize("boundary", ["auto", "fixed", "exact"])
+def test_two_parts_and_a_point_of_no_tetrahedron(tmp_path: Path, scheme: str, boundary: str) -> None:
+    mesh = jittered_grid(3, seed=0)
+    points = np.concatenate([mesh.points, mesh.points + 2.0, [[5.0, 5.0, 5.0]]])
+    tets = np.concatenate([mesh.tets, mesh.tets + len(mesh.points)])
+    write_tets(tmp_path / "map.npz", TetFile(points, tets, {TARGET: 1.01 * points}))
+    amount = ["--error", "3e-3"] if scheme == "smallest" else ["--modes", "4"]
+    options = ["--scheme", scheme, "--boundary", boundary, "--output", str(tmp_path / "map.qc3d")]
+    assert main.main(["compress", str(tmp_path / "map.npz"), *amount, *options]) == 0
+    arguments = [str(tmp_path / "map.qc3d"), str(tmp_path / "map.npz"), "--output", str(tmp_path / "o.npz")]
+    assert main.main(["decompress", *arguments]) == 0
+    missed = read_tets(tmp_path / "o.npz").at_vertices[TARGET] - 1.01 * points
+    assert np.abs(missed).max() < 0.2
+
+
+@pytest.mark.slow
+def test_folds_are_said_and_avoided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = jittered_grid(8, seed=0)
+    waves = np.array([[[1, 2, 1], [1, 1, 2], [2, 1, 1]], [[2, 0, 1], [1, 2, 0], [0, 1, 2]]])
+    amplitudes = 1.6 * np.array([[0.06, -0.05, 0.05], [-0.03, 0.04, 0.03]])
+    values = sine_map(mesh.points, amplitudes, waves)
+    write_tets(tmp_path / "map.npz", TetFile(mesh.points, mesh.tets, {TARGET: values}))
+    command = ["compress", str(tmp_path / "map.npz"), "--error", "0.02", "--output", str(tmp_path / "a.qc3d")]
+    assert main.main(command) == 0
+    assert "tetrahedra come back folded; a smaller error or --no-folds avoids that" in capsys.readouterr().err
+    assert main.main([*command, "--no-folds"]) == 0
+    assert capsys.readouterr().out.rstrip().endswith("folds 0")
 
 
 def test_many_maps(mesh: TetMesh, tmp_path: Path) -> None:
@@ -109,7 +188,10 @@ def test_frames_of_a_chain(tmp_path: Path) -> None:
     assert missed[1:] == pytest.approx(told["error"], rel=1e-6)
     assert missed.max() <= 1e-3
     assert told["raw_bytes"] == 4 * wanted[1:].size
-    assert told["folds"] == [0] * 6
+    assert told["way"].startswith("remade")
+    stored = ["--error", "1e-3", "--scheme", "stored", "--output", str(tmp_path / "s.qc3d")]
+    assert main.main(["compress", str(frames), *stored]) == 0
+    assert file.stat().st_size < (tmp_path / "s.qc3d").stat().st_size
 
 
 class TestErrors:
@@ -129,9 +211,7 @@ class TestErrors:
         assert "is not possible" in said
         assert not (tmp_path / "a.qc3d").exists()
 
-    def test_the_report_is_another_file(
-        self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_the_report_is_another_file(self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         outputs = ("--output", tmp_path / "a", "--report", tmp_path / "a")
         assert "named twice" in self.said(capsys, "compress", source, "--modes", 2, *outputs)
         outputs = ("--output", tmp_path / "a", "--report", tmp_path / "none" / "r.json")
@@ -143,7 +223,29 @@ class TestErrors:
         np.savez(tmp_path / "frames.npz", frames=np.stack([points, 2.0 * points]), faces=faces, key0=points)
         arguments = ("--modes", 3, "--scheme", "published", "--output", tmp_path / "a")
         said = self.said(capsys, "compress", tmp_path / "frames.npz", *arguments)
-        assert "leave those options out" in said
+        assert "leave that option out" in said
+
+    @pytest.mark.parametrize(
+        ("options", "reason"),
+        [
+            (["--modes", "3", "--scheme", "stored"], "chooses its modes itself"),
+            (["--modes", "3", "--no-folds"], "--no-folds belongs to --error"),
+            (["--size", "900", "--no-folds"], "--no-folds belongs to --error"),
+        ],
+    )
+    def test_options_that_do_not_go_together(
+        self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], reason: str
+    ) -> None:
+        assert reason in self.said(capsys, "compress", source, *options, "--output", tmp_path / "a")
+
+    @pytest.mark.parametrize("settings", [np.array("{}"), np.array("no"), np.array([1.0]), np.array('{"at":[0,5]}')])
+    def test_settings_that_are_none(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str], settings: np.ndarray
+    ) -> None:
+        points, faces = shapes._ball(4)
+        np.savez(tmp_path / "f.npz", frames=np.stack([points, points]), faces=faces, settings=settings)
+        said = self.said(capsys, "compress", tmp_path / "f.npz", "--error", 1e-2, "--output", tmp_path / "a")
+        assert "settings" in said
 
     def test_another_mesh(self, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert main.main(["compress", str(source), "--modes", "5", "--output", str(tmp_path / "a.qc3d")]) == 0

@@ -21,15 +21,21 @@ import numpy as np
 from numpy.lib import format as npy
 
 from qc3d_addon.cli.reconstruct import read_landmarks
+from qc3d_addon.solver.compression import compact
 from qc3d_addon.solver.compression import files as compressed_files
 from qc3d_addon.solver.compression.codec import Compressed
+from qc3d_addon.solver.compression.fields import Field, Part, Space
+from qc3d_addon.solver.compression.pack import small_frames, small_maps, unpacked
+from qc3d_addon.solver.compression.smallest import Wanted, smallest
 from qc3d_addon.solver.fit import files as map_files
 from qc3d_addon.solver.fit import storage
 from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.frames import remade
 from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.maps.files import TetFile, read_tets, write_tets
-from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.settings import FitOptions, FrameOptions
+from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 
 from ..solver.meshes import icosphere, jittered_grid
@@ -78,6 +84,9 @@ def warm_up() -> None:
     """Make the whole files that all cases start from, which takes memory of its own."""
     for _, whole, _ in _FORMATS.values():
         whole()
+
+
+STRAIGHT = FrameOptions(mode="straight")  # bakes in no time
 
 
 @cache
@@ -182,7 +191,37 @@ def _read_stored(path: Path) -> None:
 
 
 def _read_compressed(path: Path) -> None:
-    compressed_files.read_compressed(path, _source())
+    compressed_files.from_bytes(compressed_files.read_bytes(path), _source())
+
+
+@cache
+def _small(kind: str) -> bytes:
+    """A small file as the command makes it: of maps, of frames, or of frames that are baked again."""
+    if kind == "maps":
+        return finish(small_maps(_mesh(), np.stack([_moved(), _mesh().points]), 1e-3)).data
+    if kind == "frames":
+        return finish(small_frames(_frames(), _pair().faces, 1e-4)).data
+    space, settings = Space(_pair().key0, _pair().faces), remade.Settings((0, 3), (), frame_options=STRAIGHT)
+    keys = finish(smallest(Wanted(space, _frames()[-1:] - _pair().key0, 1.0, 1e-3)))
+    remaking = compact.Remaking(remade.packed_settings(settings, None), keys, 1e-3, 0.0)
+    nothing = Field(Part("plain", 0, 0.0, np.zeros((3, 12, 3), dtype=np.int64)))
+    return compact.to_bytes(_frame_source(), space, compact.Packed("frames", "sliding", 3, nothing, None, remaking))
+
+
+def _frames() -> np.ndarray[Any, Any]:
+    return _pair().key0 * np.linspace(1.0, 1.2, 4)[:, None, None]
+
+
+def _frame_source() -> compressed_files.Source:
+    return compressed_files.Source("frames", _pair().key0, _pair().faces)
+
+
+def _read_small_maps(path: Path) -> None:
+    unpacked(compressed_files.read_bytes(path), _source())
+
+
+def _read_small_frames(path: Path) -> None:
+    finish(remade.restored(compressed_files.read_bytes(path), _frame_source(), None))
 
 
 _FORMATS: dict[str, tuple[str, Callable[[], bytes], Callable[[Path], None]]] = {
@@ -196,6 +235,9 @@ _FORMATS: dict[str, tuple[str, Callable[[], bytes], Callable[[Path], None]]] = {
     "a stored map": (".map", _stored_map, _read_stored),
     "maps": (".qc3dmap", _maps, _read_maps),
     "compressed maps": (".qc3dspec", _spectral, _read_compressed),
+    "small maps": (".qc3d", lambda: _small("maps"), _read_small_maps),
+    "small frames": (".qc3d", lambda: _small("frames"), _read_small_frames),
+    "frames to bake again": (".qc3d", lambda: _small("remade"), _read_small_frames),
     "landmarks": (".csv", _landmarks, lambda path: read_landmarks(path) and None),
 }
 _TEXTS = {"landmarks", "tetrahedra .mesh", "tetrahedra .vtu"}

@@ -48,7 +48,7 @@ def open_arm(window: Window, repository: Path) -> None:
     window.ask(
         f"""
 bpy.context.view_layer.objects.active = arm()
-arm().qc3d.play_on, arm().qc3d.count = "slider", 3
+arm().qc3d.play_on, arm().qc3d.count, arm().qc3d.more = "slider", 3, False
 arm().qc3d.from_key, arm().qc3d.to_key = {FROM!r}, {TO!r}
 view()[1].spaces.active.shading.type = 'WIREFRAME'
 view()[1].spaces.active.overlay.show_overlays = False

@@ -99,3 +99,18 @@ def test_escape_stops_all_of_them(rigged: Window) -> None:
     rigged.wait_for("job() is None")
     rigged.wait_for("'Bake Keys was canceled; nothing was changed.' in reports()")
     assert rigged.ask("state()") == before
+
+
+def test_escape_stops_a_combination(rigged: Window, tmp_path: Path) -> None:
+    before = rigged.ask("state()")
+    keys = "first='Bend 90', second='Twist 120'"
+    rigged.ask(f"with inside('UI'): bpy.ops.qc3d.combine_keys('INVOKE_DEFAULT', {keys})")
+    rigged.wait_for("child()")
+    rigged.shoot(tmp_path / "combining.png")
+    rigged.hover_sidebar()
+    rigged.press("Escape")
+    rigged.wait_for("job() is None")
+    rigged.wait_for("'Combine Keys was canceled; nothing was changed.' in reports()")
+    assert rigged.ask("state()") == before
+    rigged.ask(f"with inside('UI'): bpy.ops.qc3d.combine_keys('INVOKE_DEFAULT', {keys})")
+    rigged.wait_for(f"len(names()) == {len(OWN) + 4}")

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from ...solver.frames.task import Outcome
 
 
+# Of the dialog with ticks; the width of a column is in pixels, before the interface's scale.
+_ROWS, _MOST_COLUMNS, _WIDTH = 16, 5, 220
+
+
 class KeyChoice(bpy.types.PropertyGroup):
     """A key with a tick, by its name."""
 
@@ -75,12 +79,12 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork[ManyPlan, "Sequence[Outcome | QC3
         self.ticks.clear()
         for name in bakeable_keys(context.active_object):
             self.ticks.add().name = name
-        return set(present(context.window_manager).invoke_props_dialog(self))
+        return set(present(context.window_manager).invoke_props_dialog(self, width=_WIDTH * self._columns()))
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = present(self.layout).column()
+        grid = present(self.layout).grid_flow(columns=self._columns(), even_columns=True)
         for key in self.ticks:
-            column.prop(key, "use", text=key.name)
+            grid.prop(key, "use", text=key.name)
 
     def execute(self, context: bpy.types.Context) -> Status:
         if getattr(self, "_asks", False):  # the list was confirmed
@@ -103,6 +107,10 @@ class QC3D_OT_bake_keys(BakeChoices, ChildWork[ManyPlan, "Sequence[Outcome | QC3
         if all(isinstance(outcome, CanceledError) for outcome in outcomes):
             return []
         return self.write(plan, outcomes)
+
+    def _columns(self) -> int:
+        """Columns of the dialog: the keys of a face do not fit on a screen one below the other."""
+        return min(-(-len(self.ticks) // _ROWS), _MOST_COLUMNS)
 
     def _chosen(self, obj: bpy.types.Object) -> list[str]:
         if self.which == "named" or (self.which == "selected" and len(self.keys)):

@@ -39,13 +39,14 @@ from .modes import Spectrum, Transfer, spectrum
 from .nearest_map import MOST_LOGARITHM, NORM, NearestMap
 
 Scheme = Literal["published", "logarithm", "fitted"]
-Boundary = Literal["sliding", "fixed"]
+Boundary = Literal["sliding", "fixed"]  # a fixed one exactly, or in steps
 
 # Numbers beyond so many steps do not fit the format; a step that makes larger ones is too small to be of use.
 MOST_STEPS = 2**40
 # Steps of the search for the nearest map: for the first of a row of maps, and for those that begin at the one before.
 _FIRST_ITERATIONS, _NEXT_ITERATIONS = 60, 20
 _CHECK_TOLERANCE = 1e-6
+_ZERO = 1e-9  # of the largest eigenvalue
 _MOST_WORK = 30_000_000  # tetrahedra of maps that are rebuilt for one file: about four minutes of one core
 
 
@@ -68,6 +69,8 @@ class Compressed:
         What the number 1 stands for in the remainder, in units of the map.
     remainder : (F, n, 3) int64
         Displacements that follow the rebuilding, in steps; n is 0 for none.
+    held_step : float
+        In what steps the images of a fixed boundary are from where it was; 0 where they are exact.
     """
 
     scheme: Scheme
@@ -78,6 +81,7 @@ class Compressed:
     check: float = 0.0
     remainder_step: float = 0.0
     remainder: NDArray[np.int64] | None = None
+    held_step: float = 0.0
 
 
 class Codec:
@@ -93,6 +97,8 @@ class Codec:
     observed : (n, N) sparse array, optional
         What is to be restored of a map: these combinations of its values, such as the vertices of a surface in the
         mesh; the values themselves where it is not given. Only for the scheme ``fitted``.
+    held_step : float
+        In what steps a fixed boundary is told; 0 for exactly.
     known : Spectrum, optional
         The modes, where they were computed already for a scheme with the same ones.
 
@@ -110,7 +116,9 @@ class Codec:
         boundary: Boundary = "sliding",
         observed: csr_array | None = None,
         known: Spectrum | None = None,
+        held_step: float = 0.0,
     ) -> None:
+        self.held_step = held_step if boundary == "fixed" else 0.0
         self.mesh, self.scheme, self.boundary = mesh, scheme, boundary
         self.observes_map = observed is None
         self._observed = csr_array(eye_array(len(mesh.points))) if observed is None else observed
@@ -182,8 +190,10 @@ class Codec:
         """(k,) how much coarser each mode may be rounded than the lowest."""
         if self.scheme != "fitted":
             return np.ones(modes)
-        eigenvalues = self.spectrum.eigenvalues[:modes]
-        lowest = self.spectrum.eigenvalues[1] if len(self.spectrum.eigenvalues) > 1 else 1.0
+        every = self.spectrum.eigenvalues
+        # As many are 0 as the mesh has parts.
+        lowest = min(every[every > _ZERO * every[-1]], default=1.0) if len(every) else 1.0
+        eigenvalues = every[:modes]
         return np.asarray(np.sqrt(1.0 + eigenvalues / lowest))
 
     def rounded(self, targets: Floats, coefficients: Floats, step: float) -> tuple[Compressed, Floats]:
@@ -198,7 +208,12 @@ class Codec:
         """
         steps = step * self.steps(coefficients.shape[1])[:, None]
         compressed = Compressed(
-            self.scheme, self.boundary, step, _whole(coefficients / steps, step), self.held(targets)
+            self.scheme,
+            self.boundary,
+            step,
+            _whole(coefficients / steps, step),
+            self.held(targets),
+            held_step=self.held_step,
         )
         rebuilt = self.rebuilt(compressed)
         return replace(compressed, check=self._check(rebuilt)), rebuilt
@@ -285,7 +300,11 @@ class Codec:
                 raise InputError(
                     "The map moves the cube's faces out of themselves; compress it with a fixed boundary."
                 )
-        return np.asarray(targets[:, self._boundary_rows])
+        images = np.asarray(targets[:, self._boundary_rows])
+        if not self.held_step:
+            return images
+        before = self.mesh.points[self._boundary_rows]
+        return np.asarray(before + self.held_step * np.round((images - before) / self.held_step))
 
     def _conditions(self, held: Floats) -> Conditions:
         if self.boundary == "sliding":

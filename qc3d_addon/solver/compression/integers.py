@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .entropy import decoded, encoded
 from .prediction import Predictor
-from .range_coder import decoded, encoded
 
 # Numbers that are predicted at once.
 _AT_ONCE = 1 << 20
@@ -32,12 +32,17 @@ def packed(rows: NDArray[np.int64], predictor: Predictor | None = None) -> bytes
     return bytes([order]) + encoded(left.transpose(0, 2, 1))
 
 
-def unpacked(data: bytes, shape: tuple[int, int, int], predictor: Predictor | None = None) -> NDArray[np.int64]:
-    """The rows of this shape; raises InputError where the data does not hold as many."""
+def unpacked(
+    data: bytes,
+    shape: tuple[int, int, int],
+    predictor: Predictor | None = None,
+    decode: Callable[[bytes, int], NDArray[np.int64]] = decoded,
+) -> NDArray[np.int64]:
+    """The rows of this shape, whose numbers ``decode`` finds; InputError where the data does not hold as many."""
     if not data or data[0] >= _ORDERS:
         raise InputError("The numbers are stored in a way this version does not know; the file is damaged.")
     count, points, channels = shape
-    rows = decoded(data[1:], count * points * channels).reshape(count, channels, points).transpose(0, 2, 1)
+    rows = decode(data[1:], count * points * channels).reshape(count, channels, points).transpose(0, 2, 1)
     if predictor is not None:
         rows = _together(predictor.numbers, rows)
     for _ in range(data[0]):
@@ -89,4 +94,16 @@ def inflated(data: bytes, size: int) -> bytes:
         raise InputError(f"The compressed data is damaged: {error}.") from error
     if len(result) != size:
         raise InputError("The compressed data has another length than its header says; the file is damaged.")
+    return result
+
+
+def inflated_at_most(data: bytes, most: int) -> bytes:
+    """What was deflated, if it is at most so many bytes; InputError where it is damaged or longer."""
+    opener = zlib.decompressobj()
+    try:
+        result = opener.decompress(data, most)
+    except zlib.error as error:
+        raise InputError(f"The compressed data is damaged: {error}.") from error
+    if not opener.eof:
+        raise InputError("The compressed data is damaged, or longer than can be read.")
     return result

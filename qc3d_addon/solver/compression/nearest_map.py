@@ -126,8 +126,9 @@ class _Search:
 
     def _solve(self, matrix: csr_array, values: Floats, loads: Floats) -> None:
         """Solve for the free values in place, beginning where they are; raises ReconstructionError if that fails."""
+        used = matrix.diagonal() > 0.0  # vertices of no tetrahedron stay where they are
         for coordinate in range(3):
-            free = ~self._problem.conditions.held[:, coordinate]
+            free = ~self._problem.conditions.held[:, coordinate] & used
             inner = matrix[free][:, free]
             load = (loads[:, coordinate] - matrix @ np.where(free, 0.0, values[:, coordinate]))[free]
             values[free, coordinate], status = cg(

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
 
-_BITS = 20  # of a coordinate, over the size of the points
+BITS = 20  # of a coordinate, over the size of the points
 _NEIGHBOURS = 4
 _CANDIDATES = 16  # nearest points; those that count are chosen among them exactly
 _WEIGHT_BITS = 10
@@ -29,13 +29,9 @@ class Predictor:
     """
 
     def __init__(self, points: Floats) -> None:
-        offsets = points - points.min(axis=0, initial=np.inf)
-        size = float(offsets.max(initial=0.0))
-        # The power of two above the size: scaling by it is exact.
-        exponent = _BITS - int(np.frexp(size if size > 0.0 else 1.0)[1])
-        lattice = np.floor(np.ldexp(offsets, exponent)).astype(np.int64)
-        along = _along_curve(lattice)
-        levels = _levels(along)
+        lattice = lattice_of(points)
+        along = along_curve(lattice)
+        levels = levels_along(along)
         self.order = np.lexsort((along, levels))
         self._steps = []
         for level in range(1, int(levels.max(initial=0)) + 1):
@@ -59,22 +55,31 @@ class Predictor:
         return numbers
 
 
-def _levels(along: NDArray[np.int64]) -> Ints:
+def lattice_of(points: Floats) -> NDArray[np.int64]:
+    """(n, 3) whole coordinates of points (n, 3), up to 2^20: the same on every machine and in every unit."""
+    offsets = points - points.min(axis=0, initial=np.inf)
+    size = float(offsets.max(initial=0.0))
+    # The power of two above the size: scaling by it is exact.
+    exponent = BITS - int(np.frexp(size if size > 0.0 else 1.0)[1])
+    return np.asarray(np.floor(np.ldexp(offsets, exponent)).astype(np.int64))
+
+
+def levels_along(along: NDArray[np.int64]) -> Ints:
     """(n,) 0 for the first point in each of a few large cells, 1 for that in each cell of half the size, and so on."""
-    levels = np.full(len(along), _BITS, dtype=np.int64)
-    for level in range(_BITS):
-        _, first = np.unique(along >> 3 * (_BITS - 1 - level), return_index=True)
-        new = first[levels[first] == _BITS]
+    levels = np.full(len(along), BITS, dtype=np.int64)
+    for level in range(BITS):
+        _, first = np.unique(along >> 3 * (BITS - 1 - level), return_index=True)
+        new = first[levels[first] == BITS]
         levels[new] = level
-        if (levels < _BITS).all():
+        if (levels < BITS).all():
             break
     return levels
 
 
-def _along_curve(lattice: NDArray[np.int64]) -> NDArray[np.int64]:
+def along_curve(lattice: NDArray[np.int64]) -> NDArray[np.int64]:
     """(n,) places along a curve that fills space (Morton): points that are near stand together."""
     places = np.zeros(len(lattice), dtype=np.int64)
-    for bit in range(_BITS):
+    for bit in range(BITS):
         for axis in range(3):
             places |= (lattice[:, axis] >> bit & 1) << (3 * bit + axis)
     return places

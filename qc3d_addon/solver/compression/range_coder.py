@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole numbers as few bytes: an adaptive binary range coder (Martin 1979), whose models learn as they go.
+"""Reads what version 1 of the file format holds: numbers by an adaptive binary range coder (Martin 1979).
 
 A number is told as whether it is zero, how large it is, bit by bit, and its sign. What is likely depends on how large
 the numbers just before it were: numbers that belong together stand together.
@@ -29,15 +29,8 @@ MOST_PER_BYTE = 6000
 _Bit = Callable[[int, "list[int] | None"], int]
 
 
-def encoded(numbers: NDArray[np.int64]) -> bytes:
-    """Signed whole numbers (k,), each below 2^50, as bytes."""
-    encoder = _Encoder()
-    _Numbers(encoder.bit).run(np.asarray(numbers, dtype=np.int64).ravel().tolist())
-    return encoder.finished()
-
-
 def decoded(data: bytes, count: int) -> NDArray[np.int64]:
-    """The ``count`` numbers that ``encoded`` made ``data`` of.
+    """The ``count`` numbers, each below 2^50, that data means.
 
     Raises
     ------
@@ -119,47 +112,6 @@ def _has_settled(model: list[int]) -> bool:
     """Whether one more bit 0 would teach the model nothing."""
     likely, seen = model
     return seen == _MEMORY and 2 * ((1 << 16) - likely) < 2 * seen + 3
-
-
-class _Encoder:
-    def __init__(self) -> None:
-        self._low, self._range = 0, (1 << 32) - 1
-        self._bytes = bytearray()
-
-    def bit(self, bit: int, model: list[int] | None) -> int:
-        bound = (self._range >> 16) * (_HALF if model is None else model[0])
-        if bit:
-            self._low += bound
-            self._range -= bound
-            self._carry()
-        else:
-            self._range = bound
-        if model is not None:
-            _learn(model, bit)
-        while self._range < 1 << 24:
-            self._bytes.append(self._low >> 24)
-            self._low = (self._low & 0xFFFFFF) << 8
-            self._range <<= 8
-        return bit
-
-    def finished(self) -> bytes:
-        # Any value of the interval will do: the one with the most zeros at its end, which need not be written.
-        for shift in range(32, -1, -1):
-            value = -(-self._low >> shift) << shift
-            if value < self._low + self._range:
-                self._low = value
-                break
-        self._carry()
-        return bytes(self._bytes) + self._low.to_bytes(4, "big").rstrip(b"\0")
-
-    def _carry(self) -> None:
-        if self._low >> 32:
-            self._low &= (1 << 32) - 1
-            place = len(self._bytes) - 1
-            while self._bytes[place] == 255:
-                self._bytes[place] = 0
-                place -= 1
-            self._bytes[place] += 1
 
 
 class _Decoder:

@@ -85,10 +85,15 @@ class Compressor:
         What is to be compressed.
     packer : Packer
         Makes the file.
+    progress : callable, optional
+        Called with the finished share of the work from time to time.
     """
 
-    def __init__(self, codec: Codec, targets: Floats, packer: Packer) -> None:
+    def __init__(
+        self, codec: Codec, targets: Floats, packer: Packer, progress: Callable[[float], object] | None = None
+    ) -> None:
         self.codec, self.targets, self.packer = codec, targets, packer
+        self.progress = progress or (lambda share: None)
 
     def with_modes(self, modes: int) -> Choice:
         """The first modes and nothing else, with the largest step whose rounding adds about a hundredth to the error.
@@ -104,7 +109,8 @@ class Compressor:
         best = self._base(coefficients, _SMALLEST_STEP)
         allowed = best.error * (1.0 + _ROUNDING) + 1e-12
         low, high = np.log(_SMALLEST_STEP), np.log(0.1)
-        for _ in range(_HALVINGS):
+        for halving in range(_HALVINGS):
+            self.progress(halving / _HALVINGS)
             step = float(np.exp(0.5 * (low + high)))
             try:
                 tried = self._base(coefficients, step)
@@ -184,7 +190,9 @@ class Compressor:
     def _bases(self) -> Iterator[list[Choice]]:
         """Choices of modes alone: few and many, each coarse and fine."""
         known = _MODES["fitted" if self.codec.scheme == "fitted" else "published"]
-        for modes in sorted({min(modes, self.codec.modes) for modes in known}):
+        counts = sorted({min(modes, self.codec.modes) for modes in known})
+        for number, modes in enumerate(counts):
+            self.progress(number / len(counts))
             coefficients = self.codec.coefficients(self.targets, modes)
             found = []
             for step in _STEPS if modes else _STEPS[:1]:

@@ -7,13 +7,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..arrays import Floats
 from ..files.npz import write_arrays
 from ..keys.keypair import KeyPair
 
 
-def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats) -> None:
+def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats, settings: str = "") -> None:
     """Write frames (k, n, 3) at ``times`` (k,) with the faces, the first and the last key of the pairs, compressed.
+
+    With the ``settings`` of the bake, and the polygons of the triangles where some have several, the frames can be made
+    again; see ``frames.remade``.
 
     Raises
     ------
@@ -22,4 +27,9 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
     """
     own = [pair.own for pair in pairs]
     ends = {"key0": own[0].key0, "key1": own[-1].key1}
-    write_arrays(path, {"faces": own[0].faces, "frames": frames, "times": times, **ends})
+    arrays = {"faces": own[0].faces, "frames": frames, "times": times, **ends}
+    if settings:
+        arrays["settings"] = np.array(settings)
+        if len(np.unique(own[0].polygons)) < len(own[0].faces):
+            arrays["polygons"] = own[0].polygons
+    write_arrays(path, arrays)

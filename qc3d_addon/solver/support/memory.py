@@ -23,6 +23,7 @@ _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstr
 _KB_PER_FRAME, _BYTES_PER_COMPRESSED = 5.0, 220.0
 _BYTES_OF_FACTORS = 600.0  # for each vertex to the power 4/3, as for the factors of a three-dimensional mesh
 _KB_OF_MATRICES, _BLOCKS = 1.0, 6  # for each vertex; blocks of vectors and directions that are held at once
+_KB_OF_NEIGHBORS, _VECTORS_PER_MODE = 1.0, 5  # for each vertex; of all three coordinates, and while they are computed
 _SHARE_OF_MACHINE = 0.75  # leaves a quarter for Blender and the system
 
 
@@ -114,6 +115,27 @@ def require_memory_for_frames(frames: int, vertices: int) -> None:
     """
     needed = _MB_OF_A_COMMAND + frames * (_KB_PER_FRAME / 1e3 + vertices * _BYTES_PER_COMPRESSED / 1e6)
     _require(needed, f"Work on {frames} frames of {vertices} vertices", "use fewer frames or a coarser mesh")
+
+
+def compression_mb(vertices: int, frames: int, modes: int) -> float:
+    """Estimated peak memory, in megabytes, of the search for the smallest file.
+
+    Parameters
+    ----------
+    vertices, frames
+        Of what is compressed.
+    modes
+        How many modes of the mesh are tried.
+    """
+    needed = _MB_OF_A_COMMAND + frames * (_KB_PER_FRAME / 1e3 + vertices * _BYTES_PER_COMPRESSED / 1e6)
+    needed += vertices * (_KB_OF_NEIGHBORS / 1e3 + 8.0 * _VECTORS_PER_MODE * modes / 1e6)
+    return needed + (_BYTES_OF_FACTORS * vertices ** (4 / 3) / 1e6 if modes else 0.0)
+
+
+def require_memory_for_compression(vertices: int, frames: int, modes: int) -> None:
+    """Raise InputError, before the search starts, if three quarters of the machine's memory would not be enough."""
+    needed = compression_mb(vertices, frames, modes)
+    _require(needed, f"Compressing {frames} times {vertices} vertices", "use fewer frames or a coarser mesh")
 
 
 def _require(needed_mb: float, what: str, remedy: str) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.compression import files as compressed_files
 from qc3d_addon.solver.compression.codec import Compressed
-from qc3d_addon.solver.compression.files import Content, Source, from_bytes, read_compressed, to_bytes
+from qc3d_addon.solver.compression.files import Content, Source, from_bytes, read_bytes, to_bytes
 from qc3d_addon.solver.errors import InputError
 
 from ..meshes import jittered_grid
@@ -40,7 +41,7 @@ def content(maps: int = 2, modes: int = 7, remainder: bool = True, held: int = 0
 def test_there_and_back(maps: int, modes: int, remainder: bool, held: int, tmp_path: Path) -> None:
     written = content(maps, modes, remainder, held)
     (tmp_path / "maps.qc3d").write_bytes(to_bytes(SOURCE, written))
-    found = read_compressed(tmp_path / "maps.qc3d", SOURCE)
+    found = from_bytes(read_bytes(tmp_path / "maps.qc3d"), SOURCE)
     assert (found.modes, found.placement) == (60, (1.0, 2.0, 3.0, 0.5))
     for name in ("scheme", "boundary", "step", "check", "remainder_step"):
         assert getattr(found.compressed, name) == getattr(written.compressed, name)
@@ -50,6 +51,27 @@ def test_there_and_back(maps: int, modes: int, remainder: bool, held: int, tmp_p
         np.testing.assert_array_equal(found.compressed.remainder, written.compressed.remainder)
     else:
         assert found.compressed.remainder is None
+
+
+def test_what_version_1_wrote_is_read() -> None:
+    """By a range coder, which wrote this file from the same contents."""
+    data = (Path(__file__).parent / "files" / "version1.qc3d").read_bytes()
+    found, expected = from_bytes(data, SOURCE), content(maps=2, modes=7, held=5)
+    assert data[8] == 1
+    assert found.placement == expected.placement
+    np.testing.assert_array_equal(found.compressed.numbers, expected.compressed.numbers)
+    np.testing.assert_array_equal(found.compressed.remainder, expected.compressed.remainder)
+    np.testing.assert_array_equal(found.compressed.held, expected.compressed.held)
+
+
+def test_a_boundary_in_steps() -> None:
+    written = content(maps=2, modes=1, remainder=False)
+    before = MESH.points[SOURCE.boundary]
+    held = before + 0.01 * np.random.default_rng(1).integers(-5, 6, size=(2, *before.shape))
+    compressed = replace(written.compressed, boundary="fixed", held=held, held_step=0.01)
+    data = to_bytes(SOURCE, replace(written, compressed=compressed))
+    assert len(data) < 24 * before.size / 10
+    np.testing.assert_allclose(from_bytes(data, SOURCE).compressed.held, held, atol=1e-15)
 
 
 def test_every_truncation_is_refused() -> None:
@@ -90,12 +112,12 @@ def test_no_more_numbers_than_bytes_can_hold() -> None:
     struct.pack_into("<II", data, 13 + 16 + 4, 100, 20_000)  # modes computed, maps
     struct.pack_into("<I", data, 13 + 16 + 12, 100)  # modes stored
     data[-4:] = struct.pack("<I", zlib.crc32(bytes(data[:-4])))
-    with pytest.raises(InputError, match="cannot hold"):
+    with pytest.raises(InputError, match="not as many"):
         from_bytes(bytes(data), SOURCE)
 
 
 def test_more_than_a_file_holds_is_not_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compressed_files, "_MOST_NUMBERS", 833)
+    monkeypatch.setattr(compressed_files, "MOST_NUMBERS", 833)
     with pytest.raises(InputError, match="834 numbers are more than one file holds, 833"):
         to_bytes(SOURCE, content())
 
@@ -112,7 +134,7 @@ def test_another_mesh_or_kind() -> None:
 
 def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
-        read_compressed(tmp_path / "none.qc3d", SOURCE)
+        read_bytes(tmp_path / "none.qc3d")
     (tmp_path / "other.qc3d").write_bytes(b"PK" + bytes(500))
     with pytest.raises(InputError, match="not a file of compressed maps"):
-        read_compressed(tmp_path / "other.qc3d", SOURCE)
+        from_bytes(read_bytes(tmp_path / "other.qc3d"), SOURCE)

@@ -16,7 +16,7 @@ import pytest
 from numpy.lib import format as npy
 
 from qc3d_addon.cli.reconstruct import read_landmarks
-from qc3d_addon.solver.compression.files import Source, read_compressed
+from qc3d_addon.solver.compression.files import Source, from_bytes, read_bytes
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.fit.files import read_maps
 from qc3d_addon.solver.keys.files import read_pairs
@@ -38,7 +38,7 @@ READERS: list[Callable[[Path], object]] = [
     lambda path: read_tets(path.with_suffix(".vtu")),
     read_maps,
     read_landmarks,
-    lambda path: read_compressed(path, Source("maps", kuhn_grid(1).points, kuhn_grid(1).tets)),
+    lambda path: from_bytes(read_bytes(path), Source("maps", kuhn_grid(1).points, kuhn_grid(1).tets)),
 ]
 
 

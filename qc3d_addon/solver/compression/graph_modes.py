@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mesh's own modes: smooth functions on its graph, the lowest frequencies first, that are 0 where a field is.
+
+They are the eigenvectors of the graph's Laplacian without the rows of the vertices whose values are known, so that a
+boundary that is known stays exact whatever is left out (Karni & Gotsman, *Spectral compression of mesh geometry*, 2000,
+for coordinates and without a boundary).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import eigsh
+
+from ..arrays import Bools, Floats, Ints
+
+MOST_MODES = 120  # with more, no map or animation that was tried became smaller
+MOST_VERTICES = 30_000  # with more, and in a volume, factoring takes minutes
+_DENSE = 600
+# Weights that differ from edge to edge and from vertex to vertex, by a little: no symmetry and no second part of the
+# mesh leaves two eigenvalues equal, so every machine finds the same modes.
+_UNEVENNESS, _GROUND = 0.2, 1e-3
+_SHIFT = -1e-3
+_SEED = 20000723
+
+
+def laplacian(edges: Ints, count: int) -> csc_array:
+    """The graph's Laplacian (count, count) of edges (e, 2), slightly uneven, and positive definite."""
+    random = np.random.default_rng(_SEED)
+    ground = _GROUND * random.random(count)
+    weights = 1.0 + _UNEVENNESS * random.random(len(edges))
+    ends = np.concatenate([edges, edges[:, ::-1]]).T
+    adjacency = csc_array(coo_array((np.tile(weights, 2), (ends[0], ends[1])), shape=(count, count)))
+    return csc_array(diags_array(adjacency.sum(axis=0) + ground) - adjacency)
+
+
+def graph_modes(matrix: csc_array, free: Bools, count: int) -> Floats:
+    """(n, k) the lowest modes of the free vertices (n,), orthonormal, 0 at all others; k is at most ``count``."""
+    rows = np.flatnonzero(free)
+    inner = csc_array(matrix[rows][:, rows])
+    count = min(count, len(rows))
+    start = np.random.default_rng(_SEED).normal(size=len(rows))
+    if not count:
+        vectors = np.zeros((len(rows), 0))
+    elif len(rows) <= max(_DENSE, 3 * count):
+        vectors = eigh(inner.toarray(), subset_by_index=(0, count - 1))[1]
+    else:
+        values, vectors = eigsh(inner, k=count, sigma=_SHIFT, v0=start)
+        vectors = vectors[:, np.argsort(values, kind="stable")]
+    modes = np.zeros((len(free), count))
+    modes[rows] = vectors * np.where(start @ vectors < 0.0, -1.0, 1.0)
+    return modes

@@ -3,7 +3,7 @@
 """Bytes of maps and frames at equal error, by QC3D and by other ways, as Markdown tables.
 
     pip install "qc3d[benchmark]"
-    python -m benchmarks.compression --data FOLDER
+    python -m benchmarks.compression --data FOLDER [--errors 1e-3]
 
 FOLDER contains head.npz, body.npz and horse.npz.
 """
@@ -48,12 +48,14 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, metavar="FOLDER")
+    parser.add_argument("--errors", type=float, nargs="+", default=ERRORS, metavar="E")
     arguments = parser.parse_args()
+    wanted = arguments.errors
     for pose in MAPS:
         fitted = shapes.fitted(shapes.read(pose, arguments.data))
         mesh, targets = fitted.mesh, fitted.mapped[None]
         ways: dict[str, OfError] = {"**QC3D**": partial(_small_map, mesh, targets)}
-        _print(f"map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways)
+        _print(f"map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways, wanted)
         _print_named(mesh, targets)
     for through, between in CHAINS:
         frames, faces, settings, polygons = _baked(arguments.data / "body.npz", through, between)
@@ -61,7 +63,7 @@ def main() -> None:
             "**QC3D**": partial(_small_bake, frames, faces, settings, polygons),
             "QC3D, scheme stored": partial(_small_frames, frames, faces),
         }
-        _print(f"{len(frames) - 1} frames, {' → '.join(through)}", frames[0], frames[1:], ways)
+        _print(f"{len(frames) - 1} frames, {' → '.join(through)}", frames[0], frames[1:], ways, wanted)
 
 
 def _small_map(mesh: TetMesh, targets: Floats, error: float) -> Small:
@@ -87,12 +89,12 @@ def _baked(path: Path, through: Sequence[str], between: int) -> tuple[Floats, In
     return bake.frames, pair.faces, settings, pair.polygons
 
 
-def _print(label: str, points: Floats, targets: Floats, ways: dict[str, OfError]) -> None:
+def _print(label: str, points: Floats, targets: Floats, ways: dict[str, OfError], wanted: Sequence[float]) -> None:
     unit = diagonal_of(points)
     moved = targets - points
     rivals = Rivals(points, moved, unit)
     still = float(np.sqrt((moved**2).sum(axis=2).mean(axis=1).max())) / unit
-    errors = [error for error in ERRORS if error < still]  # above it nothing need be stored
+    errors = [error for error in wanted if error < still]  # above it nothing need be stored
     print(f"\n{label} ({4 * moved.size} bytes raw; {still:.1e} without anything)\n")
     print("| bytes | " + " | ".join(f"{error:.0e}" for error in errors) + " |")
     print("|---" * (len(errors) + 1) + "|", flush=True)

@@ -68,6 +68,7 @@ def wavy(points: Floats, count: int = 5) -> Floats:
 
 
 class TestMaps:
+    @pytest.mark.slow
     @settings(max_examples=15, deadline=None)
     @given(
         st.integers(5, 150),
@@ -116,6 +117,7 @@ class TestMaps:
             for error in (1e-2, 1e-4):
                 assert maps(error, boundary, mesh, targets).error <= error
 
+    @pytest.mark.slow
     def test_modes_alone_are_smallest_for_what_is_smooth(self) -> None:
         mesh = jittered_grid(10, seed=1)
         small = maps(3e-3, "auto", mesh, sine_map(mesh.points, AMPLITUDES, WAVES)[None])
@@ -129,6 +131,7 @@ class TestMaps:
         assert len(small.data) < HEADER
         np.testing.assert_array_equal(small.restored[0], MESH.points)
 
+    @pytest.mark.slow
     def test_without_folds(self) -> None:
         mesh = jittered_grid(8, seed=0)
         targets = sine_map(mesh.points, 1.6 * AMPLITUDES, WAVES)[None]
@@ -141,6 +144,7 @@ class TestMaps:
         with pytest.raises(InputError, match=r"fold \d+ tetrahedra even with"):
             finish(without_folds(lambda error: small_maps(MESH, mirrored[None], error, "fixed"), 0.1))
 
+    @pytest.mark.slow
     def test_the_size_is_kept(self) -> None:
         smalls = [finish(of_size(lambda error: small_maps(MESH, MAP[None], error), size)) for size in (150, 500)]
         assert len(smalls[0].data) <= 150
@@ -164,6 +168,7 @@ class TestMaps:
 
 
 class TestFrames:
+    @pytest.mark.slow
     @settings(max_examples=10, deadline=None)
     @given(st.integers(2, 6), st.floats(-6.0, -1.0), st.integers(0, 10**6))
     def test_the_error_is_kept(self, count: int, exponent: float, seed: int) -> None:

@@ -16,6 +16,9 @@ from ..support.progress import Steps
 from .base import KeysOnBase
 from .combine import Combination, combine
 
+_ACROSS = 1e-3  # of the size: what a half may reach across its plane
+_NO_HALF = "The mesh is open on a plane, but both keys together reach across it: it was not taken as one half."
+
 
 class MirroredShapes:
     """Shapes of a mesh with their mirror images.
@@ -49,6 +52,13 @@ class MirroredShapes:
             whole = whole.mirrored(plane)
         self.shapes, self.faces, self.edges = whole.shapes, whole.faces, whole.edges
 
+    def reaches_across(self, shape: Floats) -> bool:
+        """Whether the mesh's own part of a shape (w, 3) of the whole is on both sides of a plane."""
+        own = shape[: self._count]
+        least = _ACROSS * max(float(np.ptp(own, axis=0).max(initial=0.0)), *(plane.reach for plane, _ in self._seams))
+        heights = (plane.heights(own) for plane, _ in self._seams)
+        return any(height.min() < -least and height.max() > least for height in heights)
+
     def own(self, shape: Floats) -> Floats:
         """(n, 3) the mesh's own part of a shape (w, 3) of the whole, with its seam on the planes."""
         half = shape[: self._count]
@@ -69,7 +79,8 @@ def combine_halves(
     Parameters
     ----------
     mirror : Mirror
-        The axes to mirror across, or how to find them, see ``mirror_planes``.
+        The axes to mirror across, or how to find them, see ``mirror_planes``. With ``auto``, a mesh that reaches across
+        its plane with all keys on is no half.
     keys, weights, order, options
         See ``combine``.
 
@@ -86,4 +97,7 @@ def combine_halves(
     mesh = MirroredShapes(shapes, first.faces, first.edges, first.polygons, planes)
     base, *others = mesh.shapes
     made = yield from combine(KeysOnBase(base, others, mesh.faces, mesh.edges), weights, order, options)
+    if mirror == "auto" and mesh.reaches_across(made.shape):
+        alone = yield from combine(keys, weights, order, options)
+        return replace(alone, notes=(_NO_HALF, *alone.notes))
     return replace(made, shape=mesh.own(made.shape))

@@ -211,3 +211,14 @@ def test_a_half_is_combined_as_the_mirrored_whole(mirror: Mirror) -> None:
 def test_an_unknown_mirror() -> None:
     with pytest.raises(qc3d.InputError, match="Unknown mirror 'w'"):
         qc3d.combine(REST, [posed(REST, 60.0, 0.0), REST], FACES, mirror="w")  # type: ignore[arg-type]
+
+
+def test_a_limb_that_reaches_across_its_open_end_is_no_half() -> None:
+    faces = FACES[(REST[FACES][:, :, 0] > 1e-9).any(axis=1)]
+    raised, bent, truth = posed(REST, 100.0, 0.0), posed(REST, 0.0, 90.0, (0.0, 0.0, 1.0)), posed(REST, 100.0, 90.0)
+    assert min(raised[:, 0].min(), bent[:, 0].min()) > -1e-9
+    assert truth[:, 0].min() < -0.1
+    found = qc3d.combine(REST, [raised, bent], faces)
+    assert off(found.shape, truth) < 1e-6
+    assert found.crossings == 0
+    assert any("was not taken as one half" in note for note in found.notes)

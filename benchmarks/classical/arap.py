@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import interior
-from .gradients import Floats, GradientPath, Ints, LeastSquares, RigidMotion, factorised, rotations_nearest
+from .gradients import Floats, GradientPath, Ints, LeastSquares, RigidMotion, factorized, rotations_nearest
 
 SWEEPS = 40  # local/global iterations for the samples' positions in the second key
 
@@ -68,7 +68,7 @@ def place_samples(system: LeastSquares, points: Floats, surface: Floats) -> Floa
     held = len(surface)
     if held == len(points):
         return surface
-    inner = factorised(system.matrix[held:, held:])
+    inner = factorized(system.matrix[held:, held:])
     coupling = system.matrix[held:, :held]
     harmonic = inner.solve(-(coupling @ (surface - points[:held])))
     final = np.concatenate([surface, points[held:] + harmonic])

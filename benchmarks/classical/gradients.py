@@ -34,25 +34,25 @@ class RigidMotion:
     """The rigid motion that carries the first key closest to the second (Kabsch 1976)."""
 
     rotation: Rotation
-    centre0: Floats
-    centre1: Floats
+    center0: Floats
+    center1: Floats
 
     @classmethod
     def between(cls, key0: Floats, key1: Floats) -> RigidMotion:
         """The best motion by least squares over the vertices."""
-        centre0, centre1 = key0.mean(axis=0), key1.mean(axis=0)
-        covariance = (key1 - centre1).T @ (key0 - centre0)
-        return cls(Rotation.from_matrix(rotations_nearest(covariance[None])[0]), centre0, centre1)
+        center0, center1 = key0.mean(axis=0), key1.mean(axis=0)
+        covariance = (key1 - center1).T @ (key0 - center0)
+        return cls(Rotation.from_matrix(rotations_nearest(covariance[None])[0]), center0, center1)
 
     def undo(self, key1: Floats) -> Floats:
         """The second key moved by the inverse of the motion."""
-        return np.asarray(self.rotation.inv().apply(key1 - self.centre1) + self.centre0)
+        return np.asarray(self.rotation.inv().apply(key1 - self.center1) + self.center0)
 
     def apply(self, shape: Floats, time: float) -> Floats:
         """Move a shape by the fraction ``time`` of the motion: a fraction of the angle, and the center in a line."""
         part = Rotation.from_rotvec(time * self.rotation.as_rotvec())
-        centre = (1.0 - time) * self.centre0 + time * self.centre1
-        return np.asarray(part.apply(shape - self.centre0) + centre)
+        center = (1.0 - time) * self.center0 + time * self.center1
+        return np.asarray(part.apply(shape - self.center0) + center)
 
 
 class GradientPath:
@@ -124,9 +124,9 @@ class LeastSquares:
 
     @cached_property
     def _factor(self) -> SuperLU:
-        return factorised(self.matrix[self._free][:, self._free])
+        return factorized(self.matrix[self._free][:, self._free])
 
-    def shape(self, gradients: Floats, centres_like: Floats) -> Floats:
+    def shape(self, gradients: Floats, centers_like: Floats) -> Floats:
         """Points (count, 3) with gradients closest to those given, each component centered as in another shape.
 
         The equations leave the translation of every component undetermined, so one point of each is fixed while
@@ -135,11 +135,11 @@ class LeastSquares:
         solution = np.zeros((self.count, 3))
         solution[self._free] = self._factor.solve(self.divergence(gradients)[self._free])
         sizes = np.bincount(self.components)[:, None]
-        missing = centres_like - solution
+        missing = centers_like - solution
         shift = np.stack([np.bincount(self.components, missing[:, i]) for i in range(3)], axis=1) / sizes
         return np.asarray(solution + shift[self.components])
 
 
-def factorised(matrix: csc_array) -> SuperLU:
+def factorized(matrix: csc_array) -> SuperLU:
     """Factor a symmetric positive definite matrix."""
     return splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -100,9 +100,9 @@ class Level(NamedTuple):
     @classmethod
     def nested(cls, corners: Floats, sizes: tuple[int, ...]) -> list[Level]:
         """Levels from the coarsest to the finest, whose members are the triangles (m, 3, 3)."""
-        centres = corners.mean(axis=1)
+        centers = corners.mean(axis=1)
         normals = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        place = (centres - centres.min(axis=0)) / np.ptp(centres, axis=0).max()
+        place = (centers - centers.min(axis=0)) / np.ptp(centers, axis=0).max()
         parents = np.zeros(len(corners), dtype=np.int64)
         labels = []
         for size in sizes:
@@ -117,7 +117,7 @@ class Level(NamedTuple):
             triangles = np.bincount(label)
             order = np.argsort(label, kind="stable")
             starts = np.cumsum(triangles) - triangles
-            middles = np.add.reduceat(centres[order], starts) / triangles[:, None]
+            middles = np.add.reduceat(centers[order], starts) / triangles[:, None]
             spread = np.linalg.norm(corners - middles[label][:, None], axis=2).max(axis=1)
             levels.append(
                 cls(

@@ -22,7 +22,7 @@ from ..solver.compression.pack import (
     Small,
     diagonal_of,
     of_size,
-    quantised_size,
+    quantized_size,
     small_frames,
     small_maps,
     without_folds,
@@ -125,7 +125,7 @@ def _compress(arguments: argparse.Namespace) -> None:
     report = result.report
     speech.say(
         f"{len(result.data)} bytes ({result.way}), 1 : {report['ratio_to_raw']:.0f} of raw coordinates, 1 : "
-        f"{report['ratio_to_quantised']:.2f} of quantised ones at the same error; error {result.error:.2g}, folds "
+        f"{report['ratio_to_quantized']:.2f} of quantized ones at the same error; error {result.error:.2g}, folds "
         f"{result.folds}"
     )
     if result.folds and arguments.error is not None and not is_frames:
@@ -170,13 +170,13 @@ def _of_maps(mesh: TetMesh, targets: Floats, boundary: ChosenBoundary) -> OfErro
 
 def _small_report(small: Small, points: Floats, targets: Floats, mesh: TetMesh | None) -> dict[str, Any]:
     raw, unit = 4 * targets.size, diagonal_of(points)
-    quantised = quantised_size(targets - points, unit, max(small.error, 1e-12))
+    quantized = quantized_size(targets - points, unit, max(small.error, 1e-12))
     report: dict[str, Any] = {
         "bytes": len(small.data),
         "raw_bytes": raw,
-        "quantised_bytes": quantised,
+        "quantized_bytes": quantized,
         "ratio_to_raw": raw / len(small.data),
-        "ratio_to_quantised": quantised / len(small.data),
+        "ratio_to_quantized": quantized / len(small.data),
         "way": small.way,
         "error": small.errors.tolist(),
         "mean_square_error": ((small.errors * unit) ** 2).tolist(),
@@ -245,15 +245,15 @@ def _report(compressor: Compressor, choice: Choice, size: int) -> dict[str, Any]
     """What was gained and what it cost, as plain values."""
     targets, codec = compressor.targets, compressor.codec
     raw = 4 * targets.size  # in single precision
-    quantised = compressor.quantised_coordinates(max(choice.error, 1e-12))
+    quantized = compressor.quantized_coordinates(max(choice.error, 1e-12))
     remainder = choice.compressed.remainder
     report: dict[str, Any] = {
         "bytes": size,
         "raw_bytes": raw,
-        "quantised_bytes": len(quantised.data),
-        "quantised_folds": quantised.folds,
+        "quantized_bytes": len(quantized.data),
+        "quantized_folds": quantized.folds,
         "ratio_to_raw": raw / size,
-        "ratio_to_quantised": len(quantised.data) / size,
+        "ratio_to_quantized": len(quantized.data) / size,
         "modes": choice.compressed.numbers.shape[1],
         "remainder": 0 if remainder is None else int(remainder.size),
         "error": choice.errors.tolist(),

@@ -21,7 +21,7 @@ _FACES = (
     (0, 0.0, (0.55, 0.78, 0.55)),
     (1, 1.0, (0.75, 0.58, 0.80)),
 )
-_GREY, _RED = (0.85, 0.85, 0.85), (0.85, 0.05, 0.05)
+_GRAY, _RED = (0.85, 0.85, 0.85), (0.85, 0.05, 0.05)
 _MARGIN = 0.1  # cube units around the cube, since a map may move its boundary
 _SHEETS = ((0.25, (0.55, 0.75, 0.95)), (0.5, (0.98, 0.86, 0.55)), (0.75, (0.65, 0.88, 0.65)))  # heights and colors
 _GLASS = 0.12  # opacity of the transparent faces
@@ -41,11 +41,11 @@ def draw_cube(axes: Axes, mesh: TetMesh, values: Floats, behind: bool = False) -
     behind : bool
         Look from the opposite side, which shows the other two colored faces and hides the red edge.
     """
-    colours, seen, camera = _colours(mesh), _seen(values, behind), _camera()
+    colors, seen, camera = _colors(mesh), _seen(values, behind), _camera()
     triangles, facing = _triangles(seen, mesh.boundary_faces)
     order = np.argsort(triangles[:, :, 2].mean(axis=1))
     order = order[facing[order] > 0.0]
-    shaded = colours[order] * (_DARKEST + (1.0 - _DARKEST) * facing[order, None])
+    shaded = colors[order] * (_DARKEST + (1.0 - _DARKEST) * facing[order, None])
     axes.add_collection(
         PolyCollection(list(triangles[order, :, :2]), facecolors=shaded, edgecolors="0.35", linewidths=0.25)
     )
@@ -68,15 +68,15 @@ def draw_open_cube(axes: Axes, mesh: TetMesh, values: Floats) -> None:
         Where the map sends the mesh's vertices.
     """
     seen = _seen(values, behind=False)
-    polygons, colours = [], []
-    for place, colour in _SHEETS:
+    polygons, colors = [], []
+    for place, color in _SHEETS:
         sheet = cuts(mesh.points, mesh.tets, 2, place).of(seen)
         normals = np.cross(sheet[:, 2] - sheet[:, 0], sheet[:, 3] - sheet[:, 1])
         flat = np.linalg.norm(normals, axis=1) < 1e-300
         light = np.abs(normals[:, 2]) / np.where(flat, 1.0, np.linalg.norm(normals, axis=1))
         polygons.append(sheet)
-        colours.append(np.array(colour) * (_DARKEST + (1.0 - _DARKEST) * light[:, None]))
-    sheets, paint = np.concatenate(polygons), np.concatenate(colours)
+        colors.append(np.array(color) * (_DARKEST + (1.0 - _DARKEST) * light[:, None]))
+    sheets, paint = np.concatenate(polygons), np.concatenate(colors)
     order = np.argsort(sheets[:, :, 2].mean(axis=1))
     axes.add_collection(
         PolyCollection(list(sheets[order, :, :2]), facecolors=paint[order], edgecolors="0.35", linewidths=0.2)
@@ -84,7 +84,7 @@ def draw_open_cube(axes: Axes, mesh: TetMesh, values: Floats) -> None:
     triangles, _ = _triangles(seen, mesh.boundary_faces)
     corners = mesh.points[mesh.boundary_faces]
     clear = (corners[..., 0] == 1.0).all(axis=1) | (corners[..., 1] == 0.0).all(axis=1)
-    glass = np.column_stack([_colours(mesh)[clear], np.full(np.count_nonzero(clear), _GLASS)])
+    glass = np.column_stack([_colors(mesh)[clear], np.full(np.count_nonzero(clear), _GLASS)])
     axes.add_collection(PolyCollection(list(triangles[clear, :, :2]), facecolors=glass, edgecolors="none"))
     for axis, side in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)):
         _draw_rim(axes, mesh, seen, axis, float(side))
@@ -92,12 +92,12 @@ def draw_open_cube(axes: Axes, mesh: TetMesh, values: Floats) -> None:
     _frame(axes, _camera())
 
 
-def _colours(mesh: TetMesh) -> Floats:
+def _colors(mesh: TetMesh) -> Floats:
     corners = mesh.points[mesh.boundary_faces]
-    colours = np.tile(_GREY, (len(corners), 1))
-    for axis, side, colour in _FACES:
-        colours[(corners[..., axis] == side).all(axis=1)] = colour
-    return colours
+    colors = np.tile(_GRAY, (len(corners), 1))
+    for axis, side, color in _FACES:
+        colors[(corners[..., axis] == side).all(axis=1)] = color
+    return colors
 
 
 def _camera() -> Camera:

@@ -69,7 +69,7 @@ def draw(
     faces: Ints,
     camera: Camera,
     height: int,
-    colour: tuple[float, float, float] | Floats,
+    color: tuple[float, float, float] | Floats,
     background: tuple[float, float, float],
     samples: int = 3,
 ) -> Floats:
@@ -84,7 +84,7 @@ def draw(
     camera : Camera
     height : int
         Height of the picture in pixels; its width follows from the camera.
-    colour : (3,) or (m, 3)
+    color : (3,) or (m, 3)
         Red, green, blue in 0..1, for the shape or for each triangle.
     background : (3,)
         Red, green, blue in 0..1.
@@ -103,7 +103,7 @@ def draw(
     spots = (seen[:, :2] - camera.low) * scale
     normals = _vertex_normals(points, faces) @ camera.axes.T
 
-    paint = np.broadcast_to(np.array(colour), (len(faces), 3))
+    paint = np.broadcast_to(np.array(color), (len(faces), 3))
     bands = []
     for low in range(0, height, _BAND):
         high = min(low + _BAND, height)
@@ -189,14 +189,14 @@ def _covered(spots: Floats, faces: Ints, height: int, width: int) -> tuple[Ints,
     rows = low[triangle, 1] + within // np.maximum(size[triangle, 0], 1)
 
     first, second, third = (corners[triangle, corner] for corner in range(3))
-    centre = np.stack([columns, rows], axis=1) + 0.5
+    center = np.stack([columns, rows], axis=1) + 0.5
     double_area = _cross(second - first, third - first)
     flat = double_area == 0.0
     inverse = 1.0 / np.where(flat, 1.0, double_area)
     opposite = (
-        _cross(third - second, centre - second),
-        _cross(first - third, centre - third),
-        _cross(second - first, centre - first),
+        _cross(third - second, center - second),
+        _cross(first - third, center - third),
+        _cross(second - first, center - first),
     )
     weights = np.stack(opposite, axis=1) * inverse[:, None]
     inside = (weights >= 0.0).all(axis=1) & ~flat

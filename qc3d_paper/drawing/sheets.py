@@ -18,9 +18,9 @@ from matplotlib import pyplot
 from PIL import Image
 
 BACKGROUND = (0.93, 0.93, 0.93)
-KEY_COLOUR = (0.55, 0.68, 0.86)
-INBETWEEN_COLOUR = (0.93, 0.75, 0.58)
-SCENERY_COLOUR = (0.97, 0.97, 0.97)
+KEY_COLOR = (0.55, 0.68, 0.86)
+INBETWEEN_COLOR = (0.93, 0.75, 0.58)
+SCENERY_COLOR = (0.97, 0.97, 0.97)
 _DOTS_PER_INCH = 100
 _FRAME, _PAUSE = 40, 600  # milliseconds that a moving picture shows an in-between, and a key
 _COLORS = 64  # of a moving picture: shading stays smooth, and files small
@@ -147,7 +147,7 @@ def _moment(rows: list[Row], index: int, camera: Camera, height: int) -> Image.I
 
 
 def _picture(row: Row, index: int, camera: Camera, height: int) -> Floats:
-    colour = KEY_COLOUR if index in (0, len(row.times) - 1) else INBETWEEN_COLOUR
-    paint = np.tile(colour, (len(row.faces), 1))
-    paint[len(row.faces) - row.scenery :] = SCENERY_COLOUR
+    color = KEY_COLOR if index in (0, len(row.times) - 1) else INBETWEEN_COLOR
+    paint = np.tile(color, (len(row.faces), 1))
+    paint[len(row.faces) - row.scenery :] = SCENERY_COLOR
     return draw(row.frames[index], row.faces, camera, height, paint, BACKGROUND)

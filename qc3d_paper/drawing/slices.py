@@ -13,7 +13,7 @@ import numpy as np
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.maps.analysis import Analysis
 
-from .surfaces import add_colour_bar, scale
+from .surfaces import add_color_bar, scale
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -91,8 +91,8 @@ def draw_slice(axes: Axes, analysis: Analysis, axis: int, place: float, measure:
     mesh = analysis.mapping.mesh
     rows, polygons = cut(mesh.points, mesh.tets, axis, place)
     values = analysis.measures[measure]
-    colours = scale(measure, values).mappable
-    drawn = PolyCollection(list(polygons), array=values[rows], norm=colours.norm, cmap=colours.cmap)
+    colors = scale(measure, values).mappable
+    drawn = PolyCollection(list(polygons), array=values[rows], norm=colors.norm, cmap=colors.cmap)
     drawn.set_edgecolor("face")
     drawn.set_linewidth(0.2)
     axes.add_collection(drawn)
@@ -111,7 +111,7 @@ def save_slices(analysis: Analysis, path: Path) -> None:
     for row, (measure, title) in enumerate((("dilatation", "dilatation K"), ("volume_ratio", "volume ratio"))):
         for axis in range(3):
             draw_slice(panels[row, axis], analysis, axis, float(middle[axis]), measure)
-        add_colour_bar(figure, scale(measure, analysis.measures[measure]), panels[row], label=title, shrink=0.9)
+        add_color_bar(figure, scale(measure, analysis.measures[measure]), panels[row], label=title, shrink=0.9)
     figure.savefig(path, dpi=110)
     pyplot.close(figure)
 

@@ -13,7 +13,7 @@ import numpy as np
 from qc3d_addon.solver.keys.keypair import KeyPair
 
 from .shading import Camera, Floats, best_view, draw, upright
-from .sheets import BACKGROUND, KEY_COLOUR
+from .sheets import BACKGROUND, KEY_COLOR
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -31,14 +31,14 @@ def save_distortion(pair: KeyPair, measures: dict[str, Floats], path: Path, up: 
     columns = 1 + len(measures)
     figure, panels = pyplot.subplots(1, columns, figsize=(4.2 * columns, 5.4), layout="constrained")
     figure.set_facecolor(BACKGROUND)
-    panels[0].imshow(draw(first, pair.faces, camera, _HEIGHT, KEY_COLOUR, BACKGROUND))
+    panels[0].imshow(draw(first, pair.faces, camera, _HEIGHT, KEY_COLOR, BACKGROUND))
     panels[0].set_title("first key")
     for axes, (name, values) in zip(panels[1:], measures.items(), strict=True):
-        colours = scale(name, values)
-        paint = np.asarray(colours.mappable.to_rgba(values[pair.faces].mean(axis=1)))[:, :3]
+        colors = scale(name, values)
+        paint = np.asarray(colors.mappable.to_rgba(values[pair.faces].mean(axis=1)))[:, :3]
         axes.imshow(draw(second, pair.faces, camera, _HEIGHT, paint, BACKGROUND))
         axes.set_title(f"second key: {name}")
-        add_colour_bar(figure, colours, axes, location="bottom", shrink=0.7)
+        add_color_bar(figure, colors, axes, location="bottom", shrink=0.7)
     for axes in panels:
         axes.axis("off")
     figure.savefig(path, dpi=100, facecolor=BACKGROUND)
@@ -53,9 +53,9 @@ class Scale(NamedTuple):
     high: float
 
     @classmethod
-    def of(cls, low: float, high: float, colours: str) -> Scale:
+    def of(cls, low: float, high: float, colors: str) -> Scale:
         """A scale that uses one of matplotlib's color maps."""
-        return cls(ScalarMappable(LogNorm(low, high, clip=True), colours), low, high)
+        return cls(ScalarMappable(LogNorm(low, high, clip=True), colors), low, high)
 
 
 def scale(name: str, values: Floats) -> Scale:
@@ -72,9 +72,9 @@ def scale(name: str, values: Floats) -> Scale:
     return Scale.of(1.0 / end, end, "coolwarm")
 
 
-def add_colour_bar(figure: Figure, colours: Scale, axes: Any, **options: Any) -> None:  # noqa: ANN401
+def add_color_bar(figure: Figure, colors: Scale, axes: Any, **options: Any) -> None:  # noqa: ANN401
     """Add a color bar to ``axes``, labeled at its ends and its middle."""
-    ticks = [colours.low, (colours.low * colours.high) ** 0.5, colours.high]
-    bar = figure.colorbar(colours.mappable, ax=axes, **options)
+    ticks = [colors.low, (colors.low * colors.high) ** 0.5, colors.high]
+    bar = figure.colorbar(colors.mappable, ax=axes, **options)
     bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
     bar.minorticks_off()

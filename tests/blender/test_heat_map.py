@@ -74,20 +74,20 @@ def test_the_attributes_follow_the_slider(baked: bpy.types.Object, measure: str)
         assert seen.color_attributes.active_color_name == heat_map.NAME
 
 
-def test_the_colours_are_those_of_the_scale(baked: bpy.types.Object) -> None:
+def test_the_colors_are_those_of_the_scale(baked: bpy.types.Object) -> None:
     bpy.ops.qc3d.heat_map(measure="stretch")
     state = heat_map.shown(baked)
     assert state is not None
     seen = evaluated(baked, **{SLIDER: 1.0})
     values = at_vertices(seen, "QC3D stretch")
-    colours = np.empty(4 * len(values), dtype=np.float32)
-    seen.attributes[heat_map.NAME].data.foreach_get("color", colours)
+    colors = np.empty(4 * len(values), dtype=np.float32)
+    seen.attributes[heat_map.NAME].data.foreach_get("color", colors)
     place = np.log(values / state.scale.low) / np.log(state.scale.high / state.scale.low)
-    stops = np.linspace(0.0, 1.0, len(state.scale.colours))
+    stops = np.linspace(0.0, 1.0, len(state.scale.colors))
     for channel in range(3):
-        known = [linear(colour)[channel] for colour in state.scale.colours]
+        known = [linear(color)[channel] for color in state.scale.colors]
         expected = np.interp(place, stops, known)
-        np.testing.assert_allclose(colours.reshape(-1, 4)[:, channel], expected, atol=2e-3)
+        np.testing.assert_allclose(colors.reshape(-1, 4)[:, channel], expected, atol=2e-3)
 
 
 def test_another_measure_is_shown_as_soon_as_it_is_chosen(baked: bpy.types.Object) -> None:

@@ -69,7 +69,7 @@ def test_there_and_back(source: Path, tmp_path: Path, amount: list[str], scheme:
     assert told["folds"] == [after.folds] == [0]
     assert told["raw_bytes"] == 12 * len(before.mesh.points)
     assert told["ratio_to_raw"] == told["raw_bytes"] / told["bytes"]
-    assert told["ratio_to_quantised"] == told["quantised_bytes"] / told["bytes"]
+    assert told["ratio_to_quantized"] == told["quantized_bytes"] / told["bytes"]
     assert told["mean_square_error"] == [pytest.approx(3.0 * error**2, rel=1e-6)]
     assert 0.0 < told["transfer_error"][0] < 0.05
 
@@ -87,7 +87,7 @@ def test_the_smallest(source: Path, tmp_path: Path, amount: list[str], capsys: p
     before, after = read_tets(source).mapping(), read_tets(output).mapping()
     error = np.sqrt(((after.values - before.values) ** 2).sum(axis=1).mean()) / np.sqrt(3.0)
     assert told["error"] == [pytest.approx(error, rel=1e-6)]
-    assert told["bytes"] == file.stat().st_size < told["quantised_bytes"]
+    assert told["bytes"] == file.stat().st_size < told["quantized_bytes"]
     assert told["folds"] == [after.folds]
     assert said[0].startswith("needs about ")
     assert said[1].startswith(f"{told['bytes']} bytes ({told['way']}), 1 : ")

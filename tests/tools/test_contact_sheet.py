@@ -31,10 +31,10 @@ def test_a_square_covers_its_pixels_without_gaps() -> None:
     assert is_red.sum() == 400
 
 
-def test_triangles_of_their_own_colours() -> None:
+def test_triangles_of_their_own_colors() -> None:
     camera = Camera.around(SQUARE, "front", margin=0.0)
-    colours = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    picture = draw(SQUARE, HALVES, camera, 40, colours, WHITE, samples=1)
+    colors = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    picture = draw(SQUARE, HALVES, camera, 40, colors, WHITE, samples=1)
     # The diagonal runs from the lower left to the upper right; the first half is below it.
     assert picture[30, 20, 2] == 0.0 < picture[30, 20, 0]
     assert picture[10, 20, 0] == 0.0 < picture[10, 20, 2]

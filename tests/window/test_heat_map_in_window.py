@@ -15,11 +15,11 @@ from .harness import Window
 BUTTON = "qc3d.heat_map"
 SHADING = "[view()[1].spaces.active.shading.type, view()[1].spaces.active.shading.color_type]"
 SHOWN = "sys.modules[ADDON + '.blender.heat_map.heat_map'].shown(arm())"
-FIRST, LAST = (33, 79, 166), (179, 26, 41)  # colours of the ends of the scale of stretch and volume
+FIRST, LAST = (33, 79, 166), (179, 26, 41)  # colors of the ends of the scale of stretch and volume
 
 
-def colours(window: Window, path: Path) -> set[tuple[int, ...]]:
-    """The colours in the lower left corner of the 3D view, as the screen shows them."""
+def colors(window: Window, path: Path) -> set[tuple[int, ...]]:
+    """The colors in the lower left corner of the 3D view, as the screen shows them."""
     left, bottom = window.ask("r = region('WINDOW'); [r.x, r.y]")
     window.shoot(path, (left, window.size[1] - bottom - 120, 300, 120))
     pixels = np.round(255 * matplotlib.image.imread(path)[:, :, :3]).astype(int)
@@ -27,8 +27,8 @@ def colours(window: Window, path: Path) -> set[tuple[int, ...]]:
 
 
 def has_legend(window: Window, path: Path) -> bool:
-    """Whether the colours of both ends of the scale are there, nearly: the bar runs from one to the other."""
-    drawn = np.array(sorted(colours(window, path)))
+    """Whether the colors of both ends of the scale are there, nearly: the bar runs from one to the other."""
+    drawn = np.array(sorted(colors(window, path)))
     return all((np.abs(drawn - end).max(axis=1) <= 10).any() for end in (FIRST, LAST))
 
 

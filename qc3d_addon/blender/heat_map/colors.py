@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 # A diverging map from blue through gray to red, which color-blind people can tell apart too; both arms have equal steps
 # in lightness (Moreland 2009, "Diverging color maps for scientific visualization").
-_DIVERGING: tuple[Colour, ...] = (
+_DIVERGING: tuple[Color, ...] = (
     (0.13, 0.31, 0.65), (0.42, 0.62, 0.85), (0.87, 0.87, 0.87), (0.90, 0.57, 0.45), (0.70, 0.10, 0.16),
 )  # fmt: skip
 # From gray through orange to dark red.
-_SEQUENTIAL: tuple[Colour, ...] = (
+_SEQUENTIAL: tuple[Color, ...] = (
     (0.87, 0.87, 0.87), (0.95, 0.78, 0.52), (0.90, 0.52, 0.30), (0.75, 0.25, 0.25), (0.45, 0.05, 0.25),
 )  # fmt: skip
 
@@ -39,7 +39,7 @@ class Scale(NamedTuple):
     title: str
     low: float
     high: float
-    colours: tuple[Colour, ...]
+    colors: tuple[Color, ...]
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
@@ -75,9 +75,9 @@ def _scale(measure: str, end: float) -> Scale:
     return Scale(_TITLES[measure], 1.0 / end, end, _DIVERGING)
 
 
-def linear(colour: Colour) -> Colour:
+def linear(color: Color) -> Color:
     """An sRGB color in the linear color space of Blender's attributes."""
     red, green, blue = (
-        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour
+        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in color
     )
     return red, green, blue

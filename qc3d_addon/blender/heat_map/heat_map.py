@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 NAME = "QC3D Heat Map"  # of the modifier, its nodes and the color attribute
 _STATE = "qc3d_heat_map"
+_BEFORE = "active_colour"  # in the state: the color attribute that was active before, spelled as files have it
 
 
 class Shown(NamedTuple):
@@ -77,12 +78,12 @@ def show(obj: bpy.types.Object, chain: Chain, measure: str) -> None:
         raise InputError(f"'{obj.name}' has another modifier named '{NAME}'; rename that first.")
     scale = scale_of(measure, measures[measure])
     by_step = {f"QC3D {name} {step}": of_all[step] for name, of_all in measures.items() for step in range(len(of_all))}
-    colour = _active_colour(mesh)
-    if colour == NAME:  # of the one that this one replaces
-        colour = _state(obj).get("active_colour", "")
-    state = {"slider": chain.slider, "measure": measure, "scale": scale, "active_colour": colour}
+    color = _active_color(mesh)
+    if color == NAME:  # of the one that this one replaces
+        color = _state(obj).get(_BEFORE, "")
+    state = {"slider": chain.slider, "measure": measure, "scale": scale, _BEFORE: color}
     with ExitStack() as undo:
-        undo.callback(_set_active_colour, mesh, _active_colour(mesh))
+        undo.callback(_set_active_color, mesh, _active_color(mesh))
         undo.callback(_set_attributes, mesh, _attributes(mesh))
         _set_attributes(mesh, by_step)
         mesh.color_attributes.active_color_name = NAME
@@ -118,9 +119,9 @@ def refresh(obj: bpy.types.Object, chain: Chain) -> None:
 
 def hide(obj: bpy.types.Object) -> None:
     """Remove the heat map and everything that it added."""
-    before, modifier = _state(obj).get("active_colour", ""), _modifier(obj)
+    before, modifier = _state(obj).get(_BEFORE, ""), _modifier(obj)
     _set_attributes(mesh_of(obj), None)
-    _set_active_colour(mesh_of(obj), before)
+    _set_active_color(mesh_of(obj), before)
     if modifier is not None:  # last, so that an interrupted removal can be repeated
         tree = modifier.node_group
         obj.modifiers.remove(modifier)
@@ -142,11 +143,11 @@ def _state(obj: bpy.types.Object) -> dict[str, Any]:
         return {}
 
 
-def _active_colour(mesh: bpy.types.Mesh) -> str:
+def _active_color(mesh: bpy.types.Mesh) -> str:
     return (mesh.color_attributes.active_color_name or "") if mesh.color_attributes else ""
 
 
-def _set_active_colour(mesh: bpy.types.Mesh, name: object) -> None:
+def _set_active_color(mesh: bpy.types.Mesh, name: object) -> None:
     """Let the viewport show the color attribute of this name, if there is one."""
     if isinstance(name, str) and name in mesh.color_attributes.keys():  # noqa: SIM118 - fails on half a surrogate pair
         mesh.color_attributes.active_color_name = name
@@ -213,7 +214,7 @@ def _make_nodes(tree: bpy.types.GeometryNodeTree, measure: str, scale: Scale) ->
         geometry = _store(tree, geometry, f"QC3D {name}", 'FLOAT', value)
         if name == measure:
             shown_value = value
-    geometry = _store(tree, geometry, NAME, 'FLOAT_COLOR', _colour(tree, shown_value, scale))
+    geometry = _store(tree, geometry, NAME, 'FLOAT_COLOR', _color(tree, shown_value, scale))
     link(geometry, make('NodeGroupOutput').inputs[0])
 
 
@@ -261,18 +262,18 @@ def _store(
     return node.outputs[0]
 
 
-def _colour(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale) -> bpy.types.NodeSocket:
+def _color(tree: bpy.types.NodeTree, value: bpy.types.NodeSocket, scale: Scale) -> bpy.types.NodeSocket:
     place = tree.nodes.new('ShaderNodeMapRange')
     tree.links.new(_math(tree, 'LOGARITHM', value, float(np.e)), place.inputs["Value"])
     _give(place.inputs["From Min"], float(np.log(scale.low)))
     _give(place.inputs["From Max"], float(np.log(scale.high)))
     ramp = tree.nodes.new('ShaderNodeValToRGB')
     stops = present(expect(bpy.types.ShaderNodeValToRGB, ramp).color_ramp).elements
-    while len(stops) < len(scale.colours):
+    while len(stops) < len(scale.colors):
         stops.new(0.5)
-    for number, colour in enumerate(scale.colours):
-        stops[number].position = number / (len(scale.colours) - 1)
-        stops[number].color = (*linear(colour), 1.0)  # type: ignore[assignment,unused-ignore]  # only with 5.2's stubs
+    for number, color in enumerate(scale.colors):
+        stops[number].position = number / (len(scale.colors) - 1)
+        stops[number].color = (*linear(color), 1.0)  # type: ignore[assignment,unused-ignore]  # only with 5.2's stubs
     tree.links.new(place.outputs["Result"], ramp.inputs[0])
     return ramp.outputs[0]
 

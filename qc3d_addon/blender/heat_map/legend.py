@@ -39,8 +39,8 @@ def leave(context: bpy.types.Context) -> None:
     before = screen.pop(_SHADING)
     shading.type = 'SOLID'
     with contextlib.suppress(TypeError, ValueError):  # not what ``enter`` stored: the view then stays in Solid
-        kind, colours = before
-        shading.color_type = colours
+        kind, colors = before
+        shading.color_type = colors
         shading.type = kind
 
 
@@ -82,14 +82,14 @@ def _draw_bar(scale: Scale, size: float) -> None:
     from gpu_extras.batch import batch_for_shader
 
     left, bottom = _MARGIN * size, (_MARGIN + _TEXT * 1.5) * size
-    last = len(scale.colours) - 1
-    corners, colours = [], []
-    for number, colour in enumerate(scale.colours):
+    last = len(scale.colors) - 1
+    corners, colors = [], []
+    for number, color in enumerate(scale.colors):
         x = left + _WIDTH * size * number / last
         corners += [(x, bottom), (x, bottom + _HEIGHT * size)]
-        colours += [(*colour, 1.0)] * 2
+        colors += [(*color, 1.0)] * 2
     shader = gpu.shader.from_builtin('SMOOTH_COLOR')
-    batch_for_shader(shader, 'TRI_STRIP', {"pos": corners, "color": colours}).draw(shader)
+    batch_for_shader(shader, 'TRI_STRIP', {"pos": corners, "color": colors}).draw(shader)
 
 
 def _draw_texts(scale: Scale, size: float) -> None:

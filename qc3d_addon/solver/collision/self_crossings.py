@@ -88,11 +88,11 @@ class CrossingLimit:
         """(n,) weights that are 1 at the chosen vertices and fall to 0 some rings of neighbors away."""
         edges = sides(self._faces)
         count = len(chosen)
-        neighbours = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
+        neighbors = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
         reached = chosen.astype(np.float64)
         total = reached.copy()
         for _ in range(rings):
-            reached = np.minimum(reached + neighbours @ reached + neighbours.T @ reached, 1.0)
+            reached = np.minimum(reached + neighbors @ reached + neighbors.T @ reached, 1.0)
             total += reached
         return np.asarray(total / (rings + 1))
 

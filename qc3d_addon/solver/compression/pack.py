@@ -169,7 +169,7 @@ def diagonal_of(points: Floats) -> float:
     return diagonal
 
 
-def quantised_size(displacements: Floats, unit: float, error: float) -> int:
+def quantized_size(displacements: Floats, unit: float, error: float) -> int:
     """Bytes of displacements (F, n, 3) that are rounded, with the same error, and deflated: what is compared with."""
     cells = np.empty((0, 3), dtype=np.int64)
     step = largest_step(Wanted(Space(displacements[0], cells), displacements, unit, error))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole numbers at points, told by how far each is from what its neighbours say; coarse points first, then between.
+"""Whole numbers at points, told by how far each is from what its neighbors say; coarse points first, then between.
 
 All of it is whole numbers, so that every machine predicts the same.
 """
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Floats, Ints
 
 BITS = 20  # of a coordinate, over the size of the points
-_NEIGHBOURS = 4
+_NEIGHBORS = 4
 _CANDIDATES = 16  # nearest points; those that count are chosen among them exactly
 _WEIGHT_BITS = 10
 
@@ -37,21 +37,21 @@ class Predictor:
         for level in range(1, int(levels.max(initial=0)) + 1):
             known, wanted = np.flatnonzero(levels < level), np.flatnonzero(levels == level)
             if len(wanted):
-                self._steps.append((wanted, *_neighbours(lattice, known, wanted)))
+                self._steps.append((wanted, *_neighbors(lattice, known, wanted)))
 
     def differences(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """(n, c) residuals of numbers (n, c) after the prediction, in the order of coding."""
         left = numbers.copy()
-        for wanted, neighbours, weights in self._steps:
-            left[wanted] -= _predicted(numbers[neighbours], weights)
+        for wanted, neighbors, weights in self._steps:
+            left[wanted] -= _predicted(numbers[neighbors], weights)
         return np.asarray(left[self.order])
 
     def numbers(self, differences: NDArray[np.int64]) -> NDArray[np.int64]:
         """(n, c) the numbers that have these differences."""
         numbers = np.empty_like(differences)
         numbers[self.order] = differences
-        for wanted, neighbours, weights in self._steps:
-            numbers[wanted] += _predicted(numbers[neighbours], weights)
+        for wanted, neighbors, weights in self._steps:
+            numbers[wanted] += _predicted(numbers[neighbors], weights)
         return numbers
 
 
@@ -85,13 +85,13 @@ def along_curve(lattice: NDArray[np.int64]) -> NDArray[np.int64]:
     return places
 
 
-def _neighbours(lattice: NDArray[np.int64], known: Ints, wanted: Ints) -> tuple[Ints, NDArray[np.int64]]:
+def _neighbors(lattice: NDArray[np.int64], known: Ints, wanted: Ints) -> tuple[Ints, NDArray[np.int64]]:
     """The nearest known points of each wanted one, and how much each counts: less with the square of its distance."""
     count = min(_CANDIDATES, len(known))
     near = np.reshape(cKDTree(lattice[known]).query(lattice[wanted], k=count)[1], (len(wanted), count))
     candidates = known[near]
     squares = ((lattice[candidates] - lattice[wanted][:, None]) ** 2).sum(axis=2)
-    order = np.lexsort((candidates, squares))[:, :_NEIGHBOURS]
+    order = np.lexsort((candidates, squares))[:, :_NEIGHBORS]
     squares = np.maximum(np.take_along_axis(squares, order, axis=1), 1)
     weights = np.maximum((squares[:, :1] << _WEIGHT_BITS) // squares, 1)
     return np.asarray(np.take_along_axis(candidates, order, axis=1)), np.asarray(weights)

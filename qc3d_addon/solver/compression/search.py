@@ -68,7 +68,7 @@ class Choice:
         return 0 if not any(self.folds) else 1 if max(self.folds) < _FEW * self.tets else 2
 
 
-class Quantised(NamedTuple):
+class Quantized(NamedTuple):
     """Coordinates without modes: their bytes, and, of maps, how many tetrahedra they fold."""
 
     data: bytes
@@ -172,7 +172,7 @@ class Compressor:
             raise InputError(f"{size} bytes are too few; the smallest file has {smallest:.0f}.")
         return best
 
-    def quantised_coordinates(self, error: float) -> Quantised:
+    def quantized_coordinates(self, error: float) -> Quantized:
         """The displacements themselves, rounded so that their error is ``error``, and deflated: what to beat."""
         moved = self.targets - self.codec.points
         step = _largest_step(
@@ -185,7 +185,7 @@ class Compressor:
             if self.codec.observes_map
             else ()
         )
-        return Quantised(plain_bytes(numbers), folds)
+        return Quantized(plain_bytes(numbers), folds)
 
     def _bases(self) -> Iterator[list[Choice]]:
         """Choices of modes alone: few and many, each coarse and fine."""

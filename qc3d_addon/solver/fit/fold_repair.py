@@ -40,7 +40,7 @@ def covered(mesh: TetMesh, values: Floats, other: Floats) -> Floats | None:
         if not folded.any():
             return found
         corners = around @ folded > 0.0
-        neighbours = around @ (around.T @ corners) > 0.0
-        share = np.maximum(share, 0.5 * corners + 0.5 * neighbours)
+        neighbors = around @ (around.T @ corners) > 0.0
+        share = np.maximum(share, 0.5 * corners + 0.5 * neighbors)
         found = np.asarray(values + share[:, None] * (other - values))
     return None if (determinants(mesh.jacobians(found)) <= 0.0).any() else found

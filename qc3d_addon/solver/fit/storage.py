@@ -25,7 +25,7 @@ FORMAT_VERSION = 4  # up to 3, every pair had a cube of its own
 _OLDEST = 3
 _SEAL_LENGTH = 32
 _NOT_ORTHONORMAL = 1e-9
-_CUBE = ("axes", "centre", "scale")
+_CUBE = ("axes", "center", "scale")
 _DAMAGED = "The stored map is damaged; fit the keys again."
 _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)
 
@@ -150,10 +150,10 @@ def _cube(values: dict[str, Any] | None) -> Cube | None:
     """The cube that ``to_bytes`` wrote; raises ValueError, KeyError or TypeError if it is none."""
     if values is None:
         return None
-    axes, centre, scale = (np.asarray(values[name], dtype=np.float64) for name in _CUBE)
-    shapes = (axes.shape, centre.shape, scale.shape)
-    if shapes != ((3, 3), (3,), ()) or not all(np.isfinite(part).all() for part in (axes, centre, scale)):
+    axes, center, scale = (np.asarray(values[name], dtype=np.float64) for name in _CUBE)
+    shapes = (axes.shape, center.shape, scale.shape)
+    if shapes != ((3, 3), (3,), ()) or not all(np.isfinite(part).all() for part in (axes, center, scale)):
         raise ValueError("not a cube")
     if np.abs(axes @ axes.T - np.eye(3)).max() > _NOT_ORTHONORMAL or not scale > 0.0:
         raise ValueError("not a cube")
-    return Cube(axes, centre, float(scale))
+    return Cube(axes, center, float(scale))

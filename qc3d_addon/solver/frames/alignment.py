@@ -38,14 +38,14 @@ class RigidMove:
     ----------
     turn : (3,)
         Rotation vector of R, radians.
-    centre : (3,)
+    center : (3,)
         c.
     shift : (3,)
         d.
     """
 
     turn: Floats
-    centre: Floats
+    center: Floats
     shift: Floats
 
     @classmethod
@@ -55,10 +55,10 @@ class RigidMove:
         A few Gauss-Newton steps from rest: they find what is a few degrees away and, other than the best fit, change
         gradually with the points, never by half a turn where the target is flattened or reversed.
         """
-        centre, offsets = weights @ shape, target - shape
+        center, offsets = weights @ shape, target - shape
         shift = weights @ offsets
         # Differences, not positions, go into the moments: they are zero where the target is met, which counts most.
-        spread, missing = shape - centre, offsets - shift
+        spread, missing = shape - center, offsets - shift
         turned, rotation = spread, np.eye(3)
         floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
         for _ in range(_STEPS):
@@ -67,19 +67,19 @@ class RigidMove:
             moment = weights @ np.cross(turned, missing - (turned - spread))
             step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
             turned, rotation = turned @ step.T, step @ rotation
-        return cls(rotation_vectors(rotation[None])[0], centre, shift)
+        return cls(rotation_vectors(rotation[None])[0], center, shift)
 
     def scaled(self, part: float) -> RigidMove:
         """A part, 0..1, of the motion."""
-        return RigidMove(part * self.turn, self.centre, part * self.shift)
+        return RigidMove(part * self.turn, self.center, part * self.shift)
 
     def apply(self, points: Floats) -> Floats:
         """Points (k, 3), carried along."""
-        return np.asarray((points - self.centre) @ self._rotation.T + (self.centre + self.shift))
+        return np.asarray((points - self.center) @ self._rotation.T + (self.center + self.shift))
 
     def undo(self, points: Floats) -> Floats:
         """Points (k, 3), carried back."""
-        return np.asarray((points - (self.centre + self.shift)) @ self._rotation + self.centre)
+        return np.asarray((points - (self.center + self.shift)) @ self._rotation + self.center)
 
     def undo_vectors(self, vectors: Floats) -> Floats:
         """Displacements (k, 3), turned back."""

@@ -73,8 +73,8 @@ def turning_inside(fitted: FittedMap, surface: SurfacePath) -> Turning:
     triangles, twist = surface.deformation.faces, surface.turning.twist
     if not twist.any():
         return Turning(fitted.turns, np.zeros_like(fitted.turns))
-    centres = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
-    nearest = cKDTree(centres).query(fitted.mesh.centroids)[1]
+    centers = fitted.embedding.key0[surface.vertices[triangles]].mean(axis=1)
+    nearest = cKDTree(centers).query(fitted.mesh.centroids)[1]
     twists = twist[nearest].any(axis=1)
     swing = np.where(twists[:, None], swing_beside(fitted.turns, twist[nearest]), fitted.turns)
     return Turning(swing, twist[nearest])

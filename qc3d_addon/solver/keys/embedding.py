@@ -59,9 +59,9 @@ class RigidMotion:
         The weights (n,) are positive. Collinear points take the smallest rotation that fits.
         """
         weights = weights / weights.sum()
-        source_centre, target_centre = weights @ source, weights @ target
-        covariance = (target - target_centre).T @ (weights[:, None] * (source - source_centre))
-        return cls._of_turn(best_turns(covariance[None])[0], source_centre, target_centre)
+        source_center, target_center = weights @ source, weights @ target
+        covariance = (target - target_center).T @ (weights[:, None] * (source - source_center))
+        return cls._of_turn(best_turns(covariance[None])[0], source_center, target_center)
 
     @classmethod
     def of_surface(cls, source: Floats, target: Floats, faces: Ints, shares: Floats | None = None) -> RigidMotion:
@@ -84,8 +84,8 @@ class RigidMotion:
         return cls._of_turn(turn, *(np.average(key, axis=0, weights=weights) for key in (source, target)))
 
     @classmethod
-    def _of_turn(cls, turn: Floats, source_centre: Floats, target_centre: Floats) -> RigidMotion:
-        shift = target_centre - rotation_matrices(turn[None])[0] @ source_centre
+    def _of_turn(cls, turn: Floats, source_center: Floats, target_center: Floats) -> RigidMotion:
+        shift = target_center - rotation_matrices(turn[None])[0] @ source_center
         return cls(turn, np.linalg.solve(translation_factors(turn[None])[0], shift))
 
     @property
@@ -116,14 +116,14 @@ class Cube:
     ----------
     axes : (3, 3)
         Orthonormal rows: the axes of the cube in the keys' coordinates.
-    centre : (3,)
+    center : (3,)
         The point that goes to the center of the cube, in coordinates along the axes.
     scale : float
         Cube units per unit of the keys.
     """
 
     axes: Floats
-    centre: Floats
+    center: Floats
     scale: float
 
     @classmethod
@@ -160,7 +160,7 @@ class Embedding:
     motion : RigidMotion
         Mean rigid motion of the surface from the first key to the second, in the keys' own units, in coordinates along
         the axes; only a part of it, or nothing, where some of the surface is still.
-    centre : (3,)
+    center : (3,)
         The point that goes to the center of the cube, in coordinates along the axes.
     scale : float
         Cube units per unit of the keys.
@@ -170,7 +170,7 @@ class Embedding:
     axes: Floats
     travel: Floats
     motion: RigidMotion
-    centre: Floats
+    center: Floats
     scale: float
 
     @classmethod
@@ -188,7 +188,7 @@ class Embedding:
         moves = _free_part(travel, areas)
         motion = RigidMotion.of_surface(key0, key1, faces, shares).part(moves) if moves else RigidMotion.identity()
         if cube is not None:
-            return cls(pair, axes, travel, motion, cube.centre, cube.scale)
+            return cls(pair, axes, travel, motion, cube.center, cube.scale)
         both = np.concatenate([key0, motion.undo(key1)])
         low, high = both.min(axis=0), both.max(axis=0)
         size = float((high - low).max())
@@ -203,11 +203,11 @@ class Embedding:
     def to_cube(self, points: Floats, time: float = 0.0) -> Floats:
         """Points (k, 3) in cube units, given in the keys' units at ``time`` (0..1) of the rigid motion."""
         moved = self.motion.apply(points @ self.axes.T, -time)
-        return np.asarray((moved - self.centre) * self.scale + 0.5)
+        return np.asarray((moved - self.center) * self.scale + 0.5)
 
     def from_cube(self, points: Floats, time: float) -> Floats:
         """Points (k, 3) in the keys' units, given in cube units, moved along the rigid motion up to ``time`` (0..1)."""
-        return np.asarray(self.motion.apply((points - 0.5) / self.scale + self.centre, time) @ self.axes)
+        return np.asarray(self.motion.apply((points - 0.5) / self.scale + self.center, time) @ self.axes)
 
     def straight(self, time: float) -> Floats:
         """(n, 3) cube positions at ``time`` that ``from_cube`` takes to the straight lines between the keys."""

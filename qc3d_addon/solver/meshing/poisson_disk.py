@@ -25,7 +25,7 @@ from ..triangles.topology import sides, without_piles
 SizeField = Callable[[Floats], Floats]
 
 _OVERSAMPLING = 4.0  # candidates per disk: enough to leave few gaps between the disks
-_NEIGHBOURS = 16  # at this oversampling, few candidates have more neighbors inside their disk
+_NEIGHBORS = 16  # at this oversampling, few candidates have more neighbors inside their disk
 # What is thin has short edges across it, where they are this percentile of all.
 _SHORT_PERCENTILE = 2.0
 _SAMPLES_OF_AN_EDGE = 0.25  # the part of an edge between two samples
@@ -106,10 +106,10 @@ def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools
         open_ = open_[cKDTree(kept).query(candidates)[0] >= radii]
     while open_.size:
         # A candidate wins the round if no earlier neighbor is inside its disk; the first always wins.
-        distance, neighbour = cKDTree(candidates[open_]).query(candidates[open_], k=min(_NEIGHBOURS, open_.size))
-        distance, neighbour = np.reshape(distance, (open_.size, -1)), np.reshape(neighbour, (open_.size, -1))
+        distance, neighbor = cKDTree(candidates[open_]).query(candidates[open_], k=min(_NEIGHBORS, open_.size))
+        distance, neighbor = np.reshape(distance, (open_.size, -1)), np.reshape(neighbor, (open_.size, -1))
         order = np.arange(open_.size)
-        wins = ~((distance < radii[open_, None]) & (neighbour < order[:, None])).any(axis=1)
+        wins = ~((distance < radii[open_, None]) & (neighbor < order[:, None])).any(axis=1)
         if not wins.all():
             # Where a disk contains more candidates than the neighbors looked at, winners may still conflict.
             wins[wins] = thin(candidates[open_[wins]], radii[open_[wins]])
@@ -133,7 +133,7 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
         samples = np.einsum("nk,nka->na", weights, corners[triangle])
         samples = samples[thin(samples, np.full(count, spacing))]
     vertices = rng.permutation(points)
-    vertices = vertices[without_piles(vertices, _NEIGHBOURS)]
+    vertices = vertices[without_piles(vertices, _NEIGHBORS)]
     apart: Floats = vertices[thin(vertices, np.full(len(vertices), spacing), samples)]
     return np.concatenate([samples, apart])
 

@@ -67,7 +67,7 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
     normal = RESOLUTIONS["normal"]
     places, place = np.unique(points, axis=0, return_inverse=True)
     tree = cKDTree(places)
-    distances, neighbours = tree.query(places, k=min(_NEAREST + 1, len(places)))
+    distances, neighbors = tree.query(places, k=min(_NEAREST + 1, len(places)))
     distances = np.asarray(distances, dtype=np.float64).reshape(len(places), -1)
     if distances.shape[1] == 1:
         return normal.around(places)
@@ -76,7 +76,7 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
     beside = distances[:, 1:]
     local = _SHARE / finer * np.minimum(beside.mean(axis=1), _GAP * beside[:, 0])
     for _ in range(_NEAREST):
-        local = np.minimum(local, (local[neighbours] + _SLOPE * distances).min(axis=1))
+        local = np.minimum(local, (local[neighbors] + _SLOPE * distances).min(axis=1))
 
     def size(positions: Floats) -> Floats:
         far, nearest = (np.asarray(found) for found in tree.query(positions, k=min(4, len(places))))

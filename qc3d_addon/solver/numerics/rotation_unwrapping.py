@@ -79,7 +79,7 @@ class Turning:
 
 
 def consistent_turning(
-    turns: Floats, adjacency: Ints, centres: Floats, weights: Floats, held: Bools, rest: Floats | None = None
+    turns: Floats, adjacency: Ints, centers: Floats, weights: Floats, held: Bools, rest: Floats | None = None
 ) -> Turning:
     """Unwrap the rotations of all elements, so that neighbors agree, also beyond 180 and 360 degrees.
 
@@ -89,7 +89,7 @@ def consistent_turning(
         Rotation vectors, radians, with angles in [0, pi].
     adjacency : (k, 2) int64
         Pairs of neighboring elements.
-    centres : (m, 3)
+    centers : (m, 3)
         Centroids of the elements; they relate parts that are not connected.
     weights : (m,)
         Positive weights of the elements when the axis of their part is computed.
@@ -120,7 +120,7 @@ def consistent_turning(
         rests = ~loose & (angles < 0.5 * np.pi)
         started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
     forest = forest.rooted(angles)
-    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centres, weights, loose)
+    vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centers, weights, loose)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
@@ -202,13 +202,13 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     return np.asarray(rotation_vectors(mean[None])[0])
 
 
-def _agreeing_parts(forest: _Forest, vectors: Floats, centres: Floats, weights: Floats, loose: Bools) -> Floats:
+def _agreeing_parts(forest: _Forest, vectors: Floats, centers: Floats, weights: Floats, loose: Bools) -> Floats:
     """Rotation vectors (m, 3) with every loose part that turns like the largest part beside it on the same branch."""
     largest = forest.labels == np.argmax(sums_by_label(forest.labels, weights))
     others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
     if not len(others):
         return vectors
-    nearest = np.flatnonzero(largest)[cKDTree(centres[largest]).query(centres[others])[1]]
+    nearest = np.flatnonzero(largest)[cKDTree(centers[largest]).query(centers[others])[1]]
     alike = _relative_angles(vectors[others], vectors[nearest]) < _ALIKE
     others, nearest = others[alike], nearest[alike]
     started = vectors.copy()

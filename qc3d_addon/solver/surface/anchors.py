@@ -42,14 +42,14 @@ class ScrewAnchors:
         source, target = key0[self._members], key1[self._members]
         weight = weights[self._members]
         weight = weight / sums_by_label(parts, weight)[parts]
-        centres = [means_by_label(parts, points, weight) for points in (source, target)]
-        spread = [points - centre[parts] for points, centre in zip((source, target), centres, strict=True)]
+        centers = [means_by_label(parts, points, weight) for points in (source, target)]
+        spread = [points - center[parts] for points, center in zip((source, target), centers, strict=True)]
         self._turns = best_turns(covariances_by_label(parts, weight[:, None] * spread[1], spread[0]))
         if turns is not None:
             told = turns[np.unique(labels[self._members])]
             self._turns = np.where(np.isfinite(told), told, self._turns)
         rotations = rotation_matrices(self._turns)
-        shift = centres[1] - np.einsum("kij,kj->ki", rotations, centres[0])
+        shift = centers[1] - np.einsum("kij,kj->ki", rotations, centers[0])
         self._velocities = np.linalg.solve(translation_factors(self._turns), shift[:, :, None])[:, :, 0]
         self._parts: Ints = parts.astype(np.int64)
         self._missing = key1 - self._moved(1.0)

@@ -108,11 +108,11 @@ class SurfacePath:
         self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
-        centres = self._key0[usable.faces].mean(axis=1)
+        centers = self._key0[usable.faces].mean(axis=1)
         # What stays in place turns back beside a motion that was taken out.
         self.rest = -embedding.motion.turn if still.any() else np.zeros(3)
-        neighbours = face_adjacency(usable.faces)
-        turning = consistent_turning(usable.turns, neighbours, centres, usable.weights, held, self.rest)
+        neighbors = face_adjacency(usable.faces)
+        turning = consistent_turning(usable.turns, neighbors, centers, usable.weights, held, self.rest)
         returned = np.zeros(count, dtype=bool)
         if free_after_turns:
             returned[usable.faces[turning.angles_from(self.rest) > _RETURNS]] = True

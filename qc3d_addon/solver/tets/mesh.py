@@ -57,7 +57,7 @@ class TetMesh:
         return np.asarray(self.points[self.tets].mean(axis=1))
 
     @cached_property
-    def neighbours(self) -> Ints:
+    def neighbors(self) -> Ints:
         """(M, 4) neighbor across the face opposite each corner, -1 on the boundary.
 
         Raises
@@ -79,7 +79,7 @@ class TetMesh:
     @cached_property
     def boundary_faces(self) -> Ints:
         """(F, 3) boundary triangles, with normals pointing out."""
-        tet, corner = np.nonzero(self.neighbours < 0)
+        tet, corner = np.nonzero(self.neighbors < 0)
         return np.asarray(self.tets[tet[:, None], OPPOSITE_FACES[corner]])
 
     @cached_property

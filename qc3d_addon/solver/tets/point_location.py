@@ -131,11 +131,11 @@ def _walk(mesh: TetMesh, points: Floats, tets: Ints) -> Ints:
             break
         weights = barycentric(mesh, tets[active], points[active])
         # There is nothing behind a boundary face: take another face that the point is behind.
-        weights[(mesh.neighbours[tets[active]] < 0) & (weights < -ROUNDING)] = 0.0
+        weights[(mesh.neighbors[tets[active]] < 0) & (weights < -ROUNDING)] = 0.0
         corner = weights.argmin(axis=1)
         behind = weights.min(axis=1) < -ROUNDING
         active, corner = active[behind], corner[behind]
-        tets[active] = mesh.neighbours[tets[active], corner]
+        tets[active] = mesh.neighbors[tets[active], corner]
     inside = barycentric(mesh, tets, points).min(axis=1) >= -ROUNDING
     return np.flatnonzero(~inside)
 

@@ -44,13 +44,13 @@ def winding_numbers(points: Floats, faces: Ints, queries: Floats) -> Floats:
     Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers", 2013. Barill et al., "Fast
     winding numbers for soups and clouds", 2018.
     """
-    centres, normals = _dipoles(points, faces)
+    centers, normals = _dipoles(points, faces)
     areas = np.linalg.norm(normals, axis=1)
     # A disk of the dipole's area softens the singularity at its center, where rounding of squares must not matter.
     softening = np.maximum(areas / np.pi, _ROUNDING)
-    moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centres)])
+    moments = np.column_stack([normals, np.einsum("ij,ij->i", normals, centers)])
     # All squared distances as one matrix product: (q, |q|^2, 1) times (-2 c, 1, |c|^2 + softening).
-    dipoles = np.vstack([-2.0 * centres.T, np.ones(len(centres)), (centres**2).sum(axis=1) + softening])
+    dipoles = np.vstack([-2.0 * centers.T, np.ones(len(centers)), (centers**2).sum(axis=1) + softening])
 
     def summed(query: Floats) -> Floats:
         squares = np.column_stack([query, (query**2).sum(axis=1), np.ones(len(query))]) @ dipoles
@@ -73,13 +73,13 @@ def insideness(numbers: Floats) -> Floats:
 def _dipoles(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
     """Centers and area vectors of at most about ``_MOST_DIPOLES`` clusters of neighboring triangles."""
     normals = 0.5 * face_normals(points, faces)
-    centres = points[faces].mean(axis=1)
+    centers = points[faces].mean(axis=1)
     if len(faces) <= _MOST_DIPOLES:
-        return centres, normals
+        return centers, normals
     areas = np.linalg.norm(normals, axis=1)
     cell = max(float(np.sqrt(2.0 * areas.sum() / _MOST_DIPOLES)), _ROUNDING)
     # Opposite triangles must not cancel, so the octant of the normal distinguishes clusters too.
-    keys = np.column_stack([np.floor(centres / cell), normals > 0.0])
+    keys = np.column_stack([np.floor(centers / cell), normals > 0.0])
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = group.ravel()
-    return means_by_label(group, centres, areas), sums_by_label(group, normals)
+    return means_by_label(group, centers, areas), sums_by_label(group, normals)

@@ -54,7 +54,7 @@ SPOILED: list[object] = [
 
 @pytest.fixture
 def shown(figure: bpy.types.Object) -> bpy.types.Object:
-    """A bake with its heat map, over a colour of the animator's own."""
+    """A bake with its heat map, over a color of the animator's own."""
     figure.data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
     choices = {"mode": "linear", "count": 1}
     assert bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Lean", **choices) == {"FINISHED"}
@@ -71,7 +71,7 @@ def test_it_can_be_hidden_and_shown_again(shown: bpy.types.Object, value: object
     found = heat_map.shown(shown)
     if found is not None:  # what the legend draws all the time
         assert all(0.0 <= place <= 1.0 and float(text) > 0.0 for place, text in found.scale.ticks)
-        assert all(0.0 <= part <= 1.0 for colour in found.scale.colours for part in linear(colour))
+        assert all(0.0 <= part <= 1.0 for color in found.scale.colors for part in linear(color))
     drawn(shown)
     shown.qc3d.measure = "volume"  # which shows it at once where a heat map is known
     assert bpy.ops.qc3d.heat_map(show="off") == {"FINISHED"}

@@ -31,7 +31,7 @@ def compared(points: Floats, faces: Ints, moving: Bools) -> set[tuple[int, int]]
     return set(map(tuple, np.argwhere(np.triu(meet, 1)).tolist()))
 
 
-def without_neighbours(pairs: set[tuple[int, int]], faces: Ints) -> set[tuple[int, int]]:
+def without_neighbors(pairs: set[tuple[int, int]], faces: Ints) -> set[tuple[int, int]]:
     corners = [set(face) for face in faces.tolist()]
     return {(one, other) for one, other in pairs if not corners[one] & corners[other]}
 
@@ -46,7 +46,7 @@ def test_random_meshes_in_shapes_far_from_those_the_tree_was_built_for(seed: int
     tree = TriangleTree(faces, shapes[:2], moving)
     np.testing.assert_array_equal(np.sort(tree.order), np.arange(count))
     for points in shapes:
-        assert found(tree, points, faces) == sorted(without_neighbours(compared(points, faces, moving), faces))
+        assert found(tree, points, faces) == sorted(without_neighbors(compared(points, faces, moving), faces))
 
 
 @pytest.mark.slow
@@ -56,7 +56,7 @@ def test_a_sphere_that_is_crumpled() -> None:
     moving = points[faces].mean(axis=1)[:, 2] > 0.3
     tree = TriangleTree(faces, [points], moving)
     for shape in (points, crumpled):
-        assert found(tree, shape, faces) == sorted(without_neighbours(compared(shape, faces, moving), faces))
+        assert found(tree, shape, faces) == sorted(without_neighbors(compared(shape, faces, moving), faces))
 
 
 def test_no_two_triangles_of_a_fan_too_large_to_list_are_compared() -> None:
@@ -69,7 +69,7 @@ def test_no_two_triangles_of_a_fan_too_large_to_list_are_compared() -> None:
     ball = icosphere(1)[1] + 1 + count
     both, all_move = np.concatenate([faces, ball]), np.ones(count + len(ball), dtype=bool)
     pairs = found(TriangleTree(both, [points], all_move), points, both)
-    expected = without_neighbours(compared(points, both, all_move), both)
+    expected = without_neighbors(compared(points, both, all_move), both)
     # All share the hub: only pairs of the ball, and of the ball and the fan, are left.
     assert pairs == sorted(expected)
     assert any(one < count <= other for one, other in pairs)

@@ -184,13 +184,13 @@ class TestRates:
         assert many.error <= 1e-4
         assert many.size < 3.0 * one.size
 
-    def test_less_than_quantised_coordinates(self) -> None:
+    def test_less_than_quantized_coordinates(self) -> None:
         for error in (1e-3, 1e-5):
             search = compressor("fitted")
             choice = search.with_error(error)
-            assert choice.size < len(search.quantised_coordinates(choice.error).data)
+            assert choice.size < len(search.quantized_coordinates(choice.error).data)
 
-    def test_quantised_coordinates_cost_more_the_nearer_they_are(self) -> None:
-        sizes = [len(compressor("fitted").quantised_coordinates(error).data) for error in (1e-2, 1e-3, 1e-4)]
+    def test_quantized_coordinates_cost_more_the_nearer_they_are(self) -> None:
+        sizes = [len(compressor("fitted").quantized_coordinates(error).data) for error in (1e-2, 1e-3, 1e-4)]
         assert sizes == sorted(sizes)
         assert sizes[0] < sizes[2]

@@ -19,7 +19,7 @@ from qc3d_addon.solver.compression.pack import (
     diagonal_of,
     errors_of,
     of_size,
-    quantised_size,
+    quantized_size,
     small_frames,
     small_maps,
     unpacked,
@@ -98,7 +98,7 @@ class TestMaps:
     def test_no_simple_way_is_smaller(self, error: float) -> None:
         small = maps(error)
         assert len(small.data) <= morton_and_lzma(MESH.points, MAP[None] - MESH.points, error) + HEADER
-        assert len(small.data) <= quantised_size(MAP[None] - MESH.points, np.sqrt(3.0), error) + HEADER
+        assert len(small.data) <= quantized_size(MAP[None] - MESH.points, np.sqrt(3.0), error) + HEADER
         moved = small.restored[0] - MESH.points
         assert not moved[MESH.on_cube_face].any()
 
@@ -185,7 +185,7 @@ class TestFrames:
         small = finish(small_frames(frames, FACES, error))
         moved = frames[1:] - frames[0]
         assert len(small.data) <= morton_and_lzma(frames[0], moved, error) + HEADER
-        assert len(small.data) <= quantised_size(moved, diagonal_of(frames[0]), error) + HEADER
+        assert len(small.data) <= quantized_size(moved, diagonal_of(frames[0]), error) + HEADER
 
     def test_what_moves_on_in_one_way_costs_little_more_than_one_frame(self) -> None:
         moved = bent(BALL - 0.5, 1.0) + 0.5 - BALL

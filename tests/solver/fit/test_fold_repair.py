@@ -17,7 +17,7 @@ SMOOTH = MESH.points + 0.01 * np.sin(np.pi * MESH.points)[:, [1, 2, 0]] * ~MESH.
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_vertex_pushed_through_its_neighbours(seed: int) -> None:
+def test_a_vertex_pushed_through_its_neighbors(seed: int) -> None:
     inner = np.flatnonzero(~MESH.on_cube_face.any(axis=1))
     vertex = np.random.default_rng(seed).choice(inner)
     folded = SMOOTH.copy()

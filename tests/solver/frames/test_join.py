@@ -79,8 +79,8 @@ def test_velocity_is_continuous_at_the_inner_key(chain: str, request: pytest.Fix
 def test_a_chain_that_goes_on_does_not_stop(bending: list[FittedMap]) -> None:
     before, after = velocities(bending, 0.5)
     middle = 0.5 * np.linalg.norm(before + after, axis=1).max()
-    travelled = [np.linalg.norm(part.pair.key1 - part.pair.key0, axis=1).max() for part in bending]
-    assert middle > min(travelled)
+    traveled = [np.linalg.norm(part.pair.key1 - part.pair.key0, axis=1).max() for part in bending]
+    assert middle > min(traveled)
 
 
 @pytest.mark.parametrize(("chain", "part"), [("bending", 0.05), ("turning_over", 0.3)])
@@ -113,7 +113,7 @@ def test_what_a_pair_leaves_in_place_stays_in_place() -> None:
         np.testing.assert_array_equal(shape[still], first[still])
 
 
-def test_a_time_does_not_depend_on_its_neighbours(bending: list[FittedMap]) -> None:
+def test_a_time_does_not_depend_on_its_neighbors(bending: list[FittedMap]) -> None:
     alone = baked(bending, [0.3]).frames[0]
     among = baked(bending, [0.1, 0.3, 0.9]).frames[1]
     np.testing.assert_array_equal(alone, among)

@@ -53,7 +53,7 @@ class TestKeyPair:
         assert (pair.nearly_coincident > 0) == (steps > 0)
         assert len(np.unique(pair.welded_faces)) == len(POINTS)
 
-    def test_neighbours_stay_apart_however_small_the_mesh_is_beside_its_place(self) -> None:
+    def test_neighbors_stay_apart_however_small_the_mesh_is_beside_its_place(self) -> None:
         far = np.array([3e4, -1e4, 2e4]) + POINTS
         pair = KeyPair.checked(far, far + 0.01 * POINTS, FACES)
         assert len(pair.welding[0]) == len(POINTS)

@@ -96,7 +96,7 @@ class TestEigenForm:
 
     @pytest.mark.parametrize("sign", [1.0, -1.0])
     @pytest.mark.parametrize("distance", [0.0, 1e-16, 1e-13, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4])
-    def test_gimbal_lock_and_its_neighbourhood(self, distance: float, sign: float) -> None:
+    def test_gimbal_lock_and_its_neighborhood(self, distance: float, sign: float) -> None:
         rest = np.random.default_rng(6).uniform(-np.pi, np.pi, (20, 2))
         vectors = np.array([euler(alpha, sign * (0.5 * np.pi - distance), gamma) for alpha, gamma in rest])
         stretch = (vectors * np.array([3.0, 2.0, 1.0])) @ vectors.transpose(0, 2, 1)

@@ -33,8 +33,8 @@ def forgotten(turns: Floats) -> Floats:
 
 def found(turns: Floats, adjacency: Ints, held: Bools | None = None) -> Turning:
     held = np.zeros(len(turns), dtype=bool) if held is None else held
-    centres = np.column_stack([np.arange(len(turns)), np.zeros((len(turns), 2))])
-    return consistent_turning(turns, adjacency, centres, np.ones(len(turns)), held)
+    centers = np.column_stack([np.arange(len(turns)), np.zeros((len(turns), 2))])
+    return consistent_turning(turns, adjacency, centers, np.ones(len(turns)), held)
 
 
 def assert_recovered(turns: Floats, adjacency: Ints, held: Bools | None = None) -> None:
@@ -86,7 +86,7 @@ class TestKnownTurns:
         turns = np.linspace(0.0, np.radians(300.0), 16)[:, None] * np.array([1.0, 0.0, 0.0])
         assert_recovered(turns, np.concatenate([[[15, 0]], chain(16)]))
 
-    def test_order_and_repetition_of_neighbours_do_not_matter(self) -> None:
+    def test_order_and_repetition_of_neighbors_do_not_matter(self) -> None:
         turns = np.linspace(0.0, 8.0, 30)[:, None] * np.array([0.0, 0.6, 0.8])
         assert_recovered(turns, np.concatenate([chain(30), chain(30)[::-1, ::-1], chain(30)]))
 
@@ -112,7 +112,7 @@ class TestAnyTurns:
         np.testing.assert_allclose(turning.at(1.0), rotation_matrices(turns), rtol=0.0, atol=1e-11)
         np.testing.assert_array_equal(turning.at(0.0), np.broadcast_to(np.eye(3), (40, 3, 3)))
 
-    def test_elements_without_neighbours_stay(self) -> None:
+    def test_elements_without_neighbors_stay(self) -> None:
         turns = np.random.default_rng(0).normal(size=(5, 3))
         alone = np.empty((0, 2), dtype=np.int64)
         turning = found(turns, alone)

@@ -24,9 +24,9 @@ NOTHING = np.empty((0, 3), dtype=np.int64)
 TIMES = (0.1, 0.3, 0.5, 0.85)
 
 
-def turned(points: Floats, turn: list[float], centre: Floats | None = None) -> Floats:
-    """Points turned about their mean, or about ``centre``."""
-    middle = points.mean(axis=0) if centre is None else centre
+def turned(points: Floats, turn: list[float], center: Floats | None = None) -> Floats:
+    """Points turned about their mean, or about ``center``."""
+    middle = points.mean(axis=0) if center is None else center
     return np.asarray((points - middle) @ rotation_matrices(np.array([turn]))[0].T + middle)
 
 
@@ -159,7 +159,7 @@ class TestRigidParts:
 
     def test_a_rigid_motion_of_everything_is_a_screw(self) -> None:
         # The embedding takes it out, so that nothing is left to do in the cube.
-        embedding, path = path_of(BAR, turned(BAR, [0.0, 2.0, 0.5], centre=np.array([9.0, 9.0, 9.0])), FACES)
+        embedding, path = path_of(BAR, turned(BAR, [0.0, 2.0, 0.5], center=np.array([9.0, 9.0, 9.0])), FACES)
         np.testing.assert_allclose(path.positions(0.4), embedding.key0, rtol=0.0, atol=1e-11)
 
     def test_a_straight_wire_does_not_leave_its_shape(self) -> None:

@@ -126,7 +126,7 @@ class TestEdges:
 
 
 class TestFaceAdjacency:
-    def test_two_neighbours_for_every_edge_of_a_closed_surface(self) -> None:
+    def test_two_neighbors_for_every_edge_of_a_closed_surface(self) -> None:
         faces = icosphere(1)[1]
         pairs = face_adjacency(faces)
         assert len(pairs) == 3 * len(faces) // 2

@@ -14,7 +14,7 @@ from qc3d_addon.solver.triangles.winding_number import winding_numbers
 from ..meshes import box_surface, icosphere
 
 BALL, BALL_FACES = icosphere(3)
-CENTRE = np.full(3, 0.5)
+CENTER = np.full(3, 0.5)
 # Softened dipoles count a little less than their triangles within a few times their size.
 NEAR = 0.05
 
@@ -40,7 +40,7 @@ def directions(count: int) -> Floats:
 
 
 def at_radius(radius: float, count: int = 100) -> Floats:
-    return CENTRE + radius * directions(count)
+    return CENTER + radius * directions(count)
 
 
 def test_one_inside_and_zero_outside_a_sphere() -> None:
@@ -61,15 +61,15 @@ def test_reversed_faces_wind_the_other_way() -> None:
     np.testing.assert_allclose(inside, -winding_numbers(BALL, BALL_FACES, at_radius(0.1)), rtol=0.0, atol=1e-12)
 
 
-def test_half_at_the_centre_of_an_open_hemisphere() -> None:
+def test_half_at_the_center_of_an_open_hemisphere() -> None:
     upper = BALL_FACES[(BALL[BALL_FACES, 2] >= 0.5 - 1e-9).all(axis=1)]
-    rim = solid_angles(BALL, upper, CENTRE[None])[0]
+    rim = solid_angles(BALL, upper, CENTER[None])[0]
     assert rim == pytest.approx(0.5, abs=0.06)
-    assert winding_numbers(BALL, upper, CENTRE[None])[0] == pytest.approx(rim, abs=0.01)
+    assert winding_numbers(BALL, upper, CENTER[None])[0] == pytest.approx(rim, abs=0.01)
 
 
 def test_nested_spheres_add_up() -> None:
-    nested = np.concatenate([BALL, CENTRE + 0.4 * (BALL - CENTRE)])
+    nested = np.concatenate([BALL, CENTER + 0.4 * (BALL - CENTER)])
     faces = np.concatenate([BALL_FACES, BALL_FACES + len(BALL)])
     np.testing.assert_allclose(winding_numbers(nested, faces, at_radius(0.05)), 2.0, rtol=0.0, atol=NEAR)
     np.testing.assert_allclose(winding_numbers(nested, faces, at_radius(0.2)), 1.0, rtol=0.0, atol=NEAR)
@@ -78,7 +78,7 @@ def test_nested_spheres_add_up() -> None:
 def test_far_triangles_are_their_solid_angles() -> None:
     random = np.random.default_rng(1)
     soup, faces = random.uniform(size=(60, 3)), np.arange(60).reshape(-1, 3)
-    queries = CENTRE + 6.0 * directions(50)
+    queries = CENTER + 6.0 * directions(50)
     exact = solid_angles(soup, faces, queries)
     error = np.abs(winding_numbers(soup, faces, queries) - exact)
     assert error.max() < 0.02 * np.abs(exact).max()
@@ -87,7 +87,7 @@ def test_far_triangles_are_their_solid_angles() -> None:
 @pytest.mark.parametrize("shape", ["sphere", "box", "open box"])
 def test_clusters_of_many_triangles(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
     points, faces = icosphere(4) if shape == "sphere" else box_surface((20, 20, 20), (0.6, 0.6, 0.6))
-    points = points - points.mean(axis=0) + CENTRE
+    points = points - points.mean(axis=0) + CENTER
     faces = faces[faces.shape[0] // 6 :] if shape == "open box" else faces
     monkeypatch.setattr(winding_number, "_MOST_DIPOLES", 800)
     assert 200 < len(winding_number._dipoles(points, faces)[0]) < 2_000 < len(faces)
@@ -101,7 +101,7 @@ def test_clusters_of_many_triangles(shape: str, monkeypatch: pytest.MonkeyPatch)
 
 def test_clusters_keep_the_two_sides_of_a_sheet_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     points, faces = box_surface((20, 20, 1), (0.6, 0.6, 0.02))
-    points = points - points.mean(axis=0) + CENTRE
+    points = points - points.mean(axis=0) + CENTER
     monkeypatch.setattr(winding_number, "_MOST_DIPOLES", 200)
     _, normals = winding_number._dipoles(points, faces)
     assert np.linalg.norm(normals, axis=1).sum() > 0.7
@@ -125,8 +125,8 @@ def test_triangles_without_an_area_do_not_wind(most: int, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6, 1.0])
 def test_finite_on_the_surface_itself(size: float) -> None:
-    points = CENTRE + size * (BALL - CENTRE)
-    queries = np.concatenate([points, points[BALL_FACES].mean(axis=1), CENTRE[None]])
+    points = CENTER + size * (BALL - CENTER)
+    queries = np.concatenate([points, points[BALL_FACES].mean(axis=1), CENTER[None]])
     found = winding_numbers(points, BALL_FACES, queries)
     assert np.isfinite(found).all()
     assert np.abs(found).max() < 3.0

@@ -89,8 +89,8 @@ def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
 
 def _one_frame(fitted: FittedMap) -> dict[str, float]:
     """Seconds of one frame, of its back-substitutions, and of the same back-substitutions repeated on their own."""
-    from qc3d_addon.solver.frames import volume_path
     from qc3d_addon.solver.frames.natural import NaturalFrames
+    from qc3d_addon.solver.maps import volume_system
     from qc3d_addon.solver.numerics.nested_dissection import factored
     from qc3d_addon.solver.surface import system
 
@@ -100,8 +100,8 @@ def _one_frame(fitted: FittedMap) -> dict[str, float]:
         watches.append(_Stopwatch(factored(matrix)))
         return watches[-1]
 
-    with patch.object(volume_path, "factored", watched), patch.object(system, "factored", watched):
-        maker = NaturalFrames(replace(fitted, path=None))
+    with patch.object(volume_system, "factored", watched), patch.object(system, "factored", watched):
+        maker = NaturalFrames(replace(fitted, path=None, volume=replace(fitted.volume)))  # nothing made yet
     middle = np.array([0.4])
     list(maker.frames(middle))  # what is made on first use
     runs = []

@@ -47,7 +47,7 @@ class TestStreams:
         assert done.stderr == b""
         if name == "interpolate":
             with np.load(output) as stored:
-                assert all(np.isfinite(stored[key]).all() for key in stored.files)
+                assert all(np.isfinite(stored[key]).all() for key in stored.files if stored[key].dtype.kind == "f")
         elif name == "bake":
             assert output.read_bytes()[:4] in (b"BLEN", bytes.fromhex("28b52ffd"))  # plain, or compressed as by 5.2
         else:

@@ -68,7 +68,7 @@ def control_of(obj: bpy.types.Object, chain: Chain) -> Control:
 
 def original_of(obj: bpy.types.Object, chain: Chain) -> bpy.types.Object | None:
     """The object whose slider the drivers of a copy still read, as after a script copied it; otherwise None."""
-    for driver in _drivers(keys_of(obj), chain) if not chain.on_key else ():
+    for driver in _own_drivers(keys_of(obj), chain) if not chain.on_key else ():
         owner = driver.variables[0].targets[0].id
         if isinstance(owner, bpy.types.Object) and owner != obj and is_original(obj, owner, chain):
             return owner
@@ -95,12 +95,17 @@ def restart_drivers(keys: bpy.types.Key, chain: Chain) -> None:
 
 def _drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
     """The drivers that read the chain's control, those of its own keys first: there may be thousands of others."""
+    yield from _own_drivers(keys, chain)
+    yield from (present(curve.driver) for curve in drivers.driven_by(keys, path_of(chain)).values())
+
+
+def _own_drivers(keys: bpy.types.Key, chain: Chain) -> Iterator[bpy.types.Driver]:
+    """The drivers of the chain's own keys, under the names that the record has."""
     path = path_of(chain)
     for name in chain.keys.values():
         driver = drivers.driver_of(keys, name, path)
         if driver is not None:
             yield driver
-    yield from (present(curve.driver) for curve in drivers.driven_by(keys, path).values())
 
 
 def base_key(keys: bpy.types.Key, chain: Chain) -> bpy.types.ShapeKey:

@@ -20,6 +20,8 @@ from qc3d_addon.worker.client import Limits
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user folder of the test's own."""
     monkeypatch.setattr(bpy.utils, "user_resource", lambda kind, path="", create=False: str(tmp_path / path))
+    # Blender names the menu after the preset that was chosen last.
+    monkeypatch.setattr(presets.QC3D_PT_presets, "bl_label", presets.QC3D_PT_presets.bl_label)
     (tmp_path / "presets" / "qc3d").mkdir(parents=True)
     return tmp_path / "presets" / "qc3d"
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import cg
 
@@ -71,6 +70,8 @@ class NearestMap:
         ReconstructionError
             If the map of ``start`` itself cannot be solved for.
         """
+        from scipy.optimize import minimize  # takes memory, and time to load
+
         search = _Search(self, at_tets, scales, target)
         try:
             nearest = minimize(

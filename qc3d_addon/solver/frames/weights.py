@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from ..arrays import Floats, Ints
 from ..errors import InputError
@@ -56,6 +55,9 @@ class Weights:
         >>> Weights.smooth([0.0, 0.5, 1.0]).at([0.25]).round(3)
         array([[ 0.375,  0.75 , -0.125]])
         """
+        # Only here, since it loads scipy's optimizer, which takes 10 MB and a tenth of a second.
+        from scipy.interpolate import CubicSpline
+
         places = _checked(knots)
         slopes = np.zeros((2, len(places), len(places)))
         ends = [0, *sorted(set(corners)), len(places) - 1]

@@ -184,8 +184,9 @@ class TestRates:
         assert many.error <= 1e-4
         assert many.size < 3.0 * one.size
 
-    def test_less_than_quantized_coordinates(self) -> None:
-        for error in (1e-3, 1e-5):
+    def test_less_than_quantized_coordinates(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(rate, "_MODES", {"fitted": (60,)})
+        for error in (1e-4, 1e-5):
             search = compressor("fitted")
             choice = search.with_error(error)
             assert choice.size < len(search.quantized_coordinates(choice.error).data)

@@ -55,7 +55,7 @@ class Weights:
         >>> Weights.smooth([0.0, 0.5, 1.0]).at([0.25]).round(3)
         array([[ 0.375,  0.75 , -0.125]])
         """
-        # Only here, since it loads scipy's optimizer, which takes 10 MB and a tenth of a second.
+        # Only here, since it loads scipy's optimizer, which takes 10 MB.
         from scipy.interpolate import CubicSpline
 
         places = _checked(knots)

@@ -12,7 +12,7 @@ Leaving the loop stops the work; nothing has to be cleaned up.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Generic, TypeVar, Unpack
 
 import numpy as np
@@ -35,7 +35,7 @@ from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
 from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
-from .support.progress import Progress, Steps, finish
+from .support.progress import OnProgress, Progress, Steps, finish
 from .triangles.polygons import flat_quads
 
 T = TypeVar("T")
@@ -58,7 +58,7 @@ class Work(Generic[T]):
     def __iter__(self) -> Iterator[Progress]:
         self.result = yield from self._steps
 
-    def run(self, progress: Callable[[Progress], object] | None = None) -> T:
+    def run(self, progress: OnProgress | None = None) -> T:
         """Run all steps, calling ``progress`` after each, and return the result."""
         self.result = finish(self._steps, progress)
         return self.result

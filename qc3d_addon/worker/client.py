@@ -23,7 +23,7 @@ from ..solver.files.private_folders import PrivateFolder, temporary_place
 from ..solver.frames.many import Run
 from ..solver.frames.task import Outcome, Task
 from ..solver.support.child_python import interpreter
-from ..solver.support.progress import Done, Progress
+from ..solver.support.progress import Done, OnProgress, Progress
 from . import messages
 from .exchange import (
     folder_of,
@@ -305,17 +305,14 @@ def _out_of_memory(limits: Limits) -> str:
     return f"There is not enough memory{limit}; use fewer in-betweens, a lower quality or a smaller mesh{more}."
 
 
-OnProgress = Callable[[Progress], None]
-
-
 @overload
 def run(job: Task, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Outcome: ...
 @overload
 def run(job: Corrections, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Corrected: ...
 @overload
-def run(job: Run, on_progress: Callable[[Done], None] | None = None, limits: Limits | None = None) -> Outcomes: ...
+def run(job: Run, on_progress: Callable[[Done], object] | None = None, limits: Limits | None = None) -> Outcomes: ...
 def run(
-    job: Job, on_progress: Callable[..., None] | None = None, limits: Limits | None = None
+    job: Job, on_progress: Callable[..., object] | None = None, limits: Limits | None = None
 ) -> Outcome | Outcomes | Corrected:
     """Carry out a job in a child process and wait for its result.
 

@@ -22,13 +22,12 @@ from .request import BakeRequest, BakeResult
 from .together import plan_together, write_together
 
 if TYPE_CHECKING:
-    from ...solver.support.progress import Done, Progress
+    from ...solver.support.progress import Done, OnProgress
 
 # Estimate of the saved file's size, without its shape keys: this many times that of the opened one, which may be
 # compressed.
 _TIMES_THE_SIZE = 4
 
-OnProgress = Callable[["Progress"], None]
 Result = TypeVar("Result")
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import product
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ...solver.combinations.corrections import Corrected, Corrections
     from ...solver.combinations.mirrored import MirroredShapes
     from ...solver.settings import FitOptions
-    from ...solver.support.progress import Progress
+    from ...solver.support.progress import OnProgress
 
 # A correction is close to the product of the values: parabolas through these follow it, and need a key for each pair.
 PLACES = (0.5, 1.0)
@@ -199,7 +199,7 @@ def combine(
     chosen: Sequence[str],
     find_order: bool = True,
     options: FitOptions | None = None,
-    on_progress: Callable[[Progress], object] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Made:
     """Plan, compute and write the correction keys in this process; see ``plan_combination``.
 

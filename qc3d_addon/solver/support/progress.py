@@ -77,6 +77,10 @@ class Progress(NamedTuple):
         return f"{label} ({self.fit + 1} of {self.fits})" if self.fits > 1 and self.stage in FIT_STAGES else label
 
 
+# What is told of progress; what it raises stops the work.
+OnProgress = Callable[[Progress], object]
+
+
 class Done(NamedTuple):
     """How far a run is.
 

@@ -61,6 +61,7 @@ def bake(key0: Floats, key1: Floats, collider: Collider | None, mode: str = "nat
     return frames_of(fitted, TIMES, mode, collider=collider)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "shift", "turn"), [(1.0, 0.0, np.eye(3)), (37.0, 100.0, TURN)])
 def test_a_lid_goes_over_the_eyeball(scale: float, shift: float, turn: Floats) -> None:
     eye, eye_faces = eyeball()
@@ -114,6 +115,7 @@ def test_what_a_key_has_inside_stays_as_deep_and_is_told() -> None:
     np.testing.assert_array_equal(found.frames[-1], sunk)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["natural", "linear", "straight"])
 @pytest.mark.parametrize("moves", [False, True])
 def test_every_mode_keeps_clear_of_colliders(mode: Mode, moves: bool) -> None:

@@ -90,6 +90,7 @@ def test_every_changed_byte_is_refused(place: int, change: int) -> None:
         from_bytes(bytes(data), SOURCE)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_nothing_but_a_typed_error_comes_of_any_header(data: st.DataObject) -> None:

@@ -98,6 +98,7 @@ def largest_distance(found: Bake, kind: WeightKind = "smooth") -> float:
     return float(np.linalg.norm(played - dense.frames, axis=2).max())
 
 
+@pytest.mark.slow
 def test_as_few_as_needed() -> None:
     found = bake(PlayOptions(tolerance=0.01))
     assert largest_distance(found) <= 0.011

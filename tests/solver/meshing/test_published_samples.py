@@ -28,6 +28,7 @@ def test_the_probabilities() -> None:
     np.testing.assert_array_equal(Discarding(0.1, 0.0, 0.0).kept(np.array([0.0, 0.5])), 1.0)
 
 
+@pytest.mark.slow
 def test_as_many_are_kept_as_the_probabilities_say() -> None:
     points, faces = icosphere(2)
     surface = sample_surface(points, faces, 0.05, np.random.default_rng(0))
@@ -49,6 +50,7 @@ def test_as_many_are_kept_as_the_probabilities_say() -> None:
     np.testing.assert_array_equal(found[8 : 8 + len(surface)], surface)
 
 
+@pytest.mark.slow
 def test_it_fills_the_cube() -> None:
     points, faces = icosphere(1)
     dense, sparse = (

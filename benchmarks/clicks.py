@@ -19,8 +19,11 @@ import subprocess
 import sys
 import time as clock
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from qc3d_addon.worker.standby import Standby
 
 from .catalogue import DATA, ROOT, Floats, Ints
 from .report import table, write_between_markers
@@ -79,13 +82,14 @@ def one_round(stays: bool) -> list[float]:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     qc3d_addon.register()
     _add_mesh()
+    operators: Any = bpy.ops  # whose stubs do not know this one
     seconds, processor = [], []
     for _, key, count in BAKES:
-        before = _used(jobs)
+        before = _used(jobs.standby())
         started = clock.perf_counter()
-        bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="rest", to_key=key, count=count - 1, more=False)
+        operators.qc3d.bake_inbetweens(play_on="slider", from_key="rest", to_key=key, count=count - 1, more=False)
         seconds.append(clock.perf_counter() - started)
-        processor.append(_used(jobs) - before)
+        processor.append(_used(jobs.standby()) - before)
         if not stays:
             jobs.standby().close()
     qc3d_addon.unregister()
@@ -96,12 +100,14 @@ def one_round(stays: bool) -> list[float]:
 def _add_mesh() -> None:
     import bpy
 
+    from qc3d_addon.blender.kinds import present
+
     faces, shapes = _mesh()
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(shapes["rest"].tolist(), [], faces.tolist())
     obj = bpy.data.objects.new("Mesh", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
+    present(bpy.context.scene).collection.objects.link(obj)
+    present(bpy.context.view_layer).objects.active = obj
     for name, shape in shapes.items():
         key = obj.shape_key_add(name=name, from_mix=False)
         key.points.foreach_set("co", shape.astype(np.float32).ravel())
@@ -116,9 +122,9 @@ def _mesh() -> tuple[Ints, dict[str, Floats]]:
     return faces, {"rest": sphere, FIRST: bent, SECOND: 0.4 * sphere + 0.6 * bent}
 
 
-def _used(jobs: object) -> float:
+def _used(kept: Standby) -> float:
     """Processor seconds of the child that waits; 0 where there is none, or no /proc."""
-    child = jobs.standby()._child  # type: ignore[attr-defined]
+    child = kept._child
     if child is None or not Path("/proc").exists():
         return 0.0
     fields = Path(f"/proc/{child.process.pid}/stat").read_text().rpartition(")")[2].split()

@@ -20,6 +20,7 @@ from ..surface.path import SurfacePath
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
+from .lattice import way_on_lattice
 from .meeting import MET, meet_keys
 from .own_crossings import crossing_vertices
 from .volume import Volume, in_single_precision
@@ -104,6 +105,7 @@ def _near(
         path, targets = way.result()
     with timed(seconds, "fit"):
         followed = yield from staged("fit", follow_path(fitter, [in_single_precision(target) for target in targets]))
+        followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
     return FittedMap(embedding.pair, volume, *parts)
@@ -120,6 +122,7 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
         path, targets = way.result()
     with timed(seconds, "fit"):
         followed = yield from staged("fit", meet_keys(embedding, volume.mesh, volume.landmarks, targets))
+        followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
     return FittedMap(embedding.pair, volume, *parts)

@@ -18,6 +18,7 @@ from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
 from ..triangles.winding_number import insideness, winding_numbers
+from .lattice import mesh_on_lattice
 from .stiff_landmarks import StiffFitter
 
 # Landmarks pull so hard that what is missed is what the tetrahedra cannot follow; more only makes some of them thin.
@@ -78,7 +79,7 @@ class Volume:
             made = fill_cube(points, faces, options, moved)
         else:
             made = fill_cube(points, faces, options, size=1.0 / ROOM)
-        return cls(made.mesh, made.engine, key0, faces, embedding.weights, made.notes, cube)
+        return cls(mesh_on_lattice(made.mesh), made.engine, key0, faces, embedding.weights, made.notes, cube)
 
     @cached_property
     def landmarks(self) -> csr_array:

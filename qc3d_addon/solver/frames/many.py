@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..collision.crossings import CrossingSearch
 from ..errors import QC3DError
 from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
@@ -67,6 +68,8 @@ class _Base:
             require_sizes(self.pair)
             cube = Cube.around(self.pair)
             volume = Volume.filled(Embedding.of(self.pair, cube), self.options, cube)
+            alone = replace(self.pair, key1=self.pair.key0)
+            volume = replace(volume, search=CrossingSearch(alone.welded_faces, [volume.key0]))
         except QC3DError:
             return None  # each of the keys says why
         # All of it now: later, two threads might make the same.

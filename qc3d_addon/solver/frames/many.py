@@ -104,6 +104,11 @@ class _Bases:
         found = (made for base, made in zip(self.shared, self._volumes, strict=True) if base.is_of(pair, options))
         return next(found, None)
 
+    def sharing(self, pair: KeyPair, options: FitOptions) -> KeyPair:
+        """A pair of its own, whose results are dropped with it, except for those that it shares with others."""
+        base = next((base for base in self.shared if base.is_of(pair, options)), None)
+        return replace(pair) if base is None else pair.sharing(base.pair)
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -196,8 +201,8 @@ def _beside_each_other(
     stop = threading.Event()
 
     def work(number: int) -> None:
-        # With pairs of its own: what they compute and keep is dropped with the task.
-        pairs = {ends: replace(pair) for ends, pair in tasks[number].pairs.items()}
+        options = tasks[number].fit_options
+        pairs = {ends: bases.sharing(pair, options) for ends, pair in tasks[number].pairs.items()}
         task = replace(tasks[number], pairs=pairs)
         try:
             with alone() if at_once > 1 else nullcontext():

@@ -46,8 +46,10 @@ class CrossingLimit:
         self._faces = faces
         # Two triangles that do not move cross in all shapes or in none.
         moving = ~still[faces].all(axis=1)
-        is_usable = search is not None and search.is_of(faces)
-        self._search = search.among(moving) if is_usable else CrossingSearch(faces, (key0, key1), moving)
+        if search is not None and search.is_of(faces):
+            self._search = search.among(moving)
+        else:
+            self._search = CrossingSearch(faces, (key0, key1), moving)
         # Most shapes lie near the straight lines between the keys, where far fewer triangles can meet.
         room = _ROOM * np.linalg.norm(key1 - key0, axis=1)[:, None] + _LEAST_ROOM * float(np.ptp(key0, axis=0).max())
         self._low, self._high = np.minimum(key0, key1) - room, np.maximum(key0, key1) + room

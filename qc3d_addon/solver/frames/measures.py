@@ -162,7 +162,7 @@ class EdgeExcess:
 
     def _lengths(self, shape: Floats) -> Floats:
         spans = (shape[self.edges[:, 0]] - shape[self.edges[:, 1]]) / self._unit
-        return np.sqrt(np.einsum("ij,ij->i", spans, spans))
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))
 
 
 def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:

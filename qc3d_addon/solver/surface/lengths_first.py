@@ -124,4 +124,4 @@ def _allowed(excess: Floats) -> Floats:
 
 def _lengths(shape: Floats, edges: Ints) -> Floats:
     spans = shape[edges[:, 1]] - shape[edges[:, 0]]
-    return np.sqrt(np.einsum("ij,ij->i", spans, spans))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))

@@ -15,16 +15,12 @@ gone, and this process ends.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import importlib.util
 import json
 import os
-import signal
 import sys
 import tempfile
-import threading
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -41,7 +37,8 @@ def main(arguments: list[str]) -> None:
     name = _load(package)
     importlib.import_module(f"{name}.solver.support.guarded_program").share_group()
     private_folders = importlib.import_module(f"{name}.solver.files.private_folders")
-    threading.Thread(target=_end_with_parent, args=(partial(private_folders.remove, folder),), daemon=True).start()
+    parent = importlib.import_module(f"{name}.worker.parent")
+    parent.end_with_it(partial(private_folders.remove, folder))
     if hasattr(os, "nice"):
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
@@ -69,17 +66,6 @@ def _load(package: Path) -> str:
 def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
     messages.write(json.dumps(message).encode() + b"\0")
     messages.flush()
-
-
-def _end_with_parent(clear_up: Callable[[], None]) -> None:
-    """Wait until standard input closes, then clean up and end this process and all that it started."""
-    with contextlib.suppress(OSError):
-        while os.read(0, 4096):
-            pass
-    clear_up()
-    if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
-        os.killpg(os.getpid(), signal.SIGKILL)
-    os._exit(1)
 
 
 def _limit_memory(limit: int) -> None:

@@ -14,12 +14,11 @@ import time as clock
 from contextlib import suppress
 from pathlib import Path
 
+import distributed
+import psutil
 import pytest
 
 from qc3d_addon.cli import main
-
-distributed = pytest.importorskip("distributed")
-psutil = pytest.importorskip("psutil")
 
 JOBS = """
 [defaults]

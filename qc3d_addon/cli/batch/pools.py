@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -125,13 +126,12 @@ class Cluster:
 
 def _distributed() -> ModuleType:
     try:
-        import distributed
+        return importlib.import_module("distributed")
     except ImportError as error:
         raise InputError(
             "The option --dask needs dask.distributed, which is not installed for this Python; install it by "
             'pip install "qc3d[dask]".'
         ) from error
-    return distributed
 
 
 def _on_worker(order: Order, at_once: dict[str, int]) -> Ended:

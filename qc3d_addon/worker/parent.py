@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a child process: its end when the process that started it is gone."""
+"""In a child process: what the process that started it says, and the end when that is gone."""
 
 from __future__ import annotations
 
@@ -12,26 +12,32 @@ from collections.abc import Callable
 from typing import NoReturn
 
 
-def end_with_it(clear_up: Callable[[], None], on_line: Callable[[], object] = lambda: None) -> None:
-    """Watch standard input in a thread, and end this process when it closes.
+def listen(on_line: Callable[[bytes], object], clear_up: Callable[[], object]) -> None:
+    """Read standard input in a thread, and end this process when it closes: then the parent is gone.
 
     Parameters
     ----------
+    on_line
+        Called with each line that the parent sends.
     clear_up
         Called before the end.
-    on_line
-        Called for each line that the parent sends.
     """
-    threading.Thread(target=_watch, args=(clear_up, on_line), daemon=True).start()
+    threading.Thread(target=_listen, args=(on_line, clear_up), daemon=True).start()
 
 
-def _watch(clear_up: Callable[[], None], on_line: Callable[[], object]) -> NoReturn:
-    with contextlib.suppress(OSError):
-        while words := os.read(0, 4096):
-            for _ in range(words.count(b"\n")):
-                on_line()
+def leave(clear_up: Callable[[], object]) -> NoReturn:
+    """Clean up and end this process and all that it started."""
     clear_up()
-    # The end of all that it started, too.
     if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
         os.killpg(os.getpid(), signal.SIGKILL)
     os._exit(1)
+
+
+def _listen(on_line: Callable[[bytes], object], clear_up: Callable[[], object]) -> NoReturn:
+    rest = b""
+    with contextlib.suppress(OSError):
+        while chunk := os.read(0, 4096):
+            *whole, rest = (rest + chunk).split(b"\n")
+            for line in whole:
+                on_line(line)
+    leave(clear_up)

@@ -27,7 +27,7 @@ from ...solver.files.private_folders import remove
 from ...solver.support.guarded_program import share_group
 from ...solver.support.memory import peak_memory_mb, shared_memory
 from ...solver.support.threads import use_at_most
-from ...worker.parent import end_with_it
+from ...worker.parent import listen
 from .. import speech
 from ..failures import FAILURES, told
 from ..version import version
@@ -48,7 +48,7 @@ def _run(parsers: Mapping[str, argparse.ArgumentParser], arguments: argparse.Nam
     folder = arguments.folder
     order = Order.of_json(json.loads((folder / ORDER).read_text(encoding="utf-8")))
     work = _Work(order, parsers[order.job.command], folder)
-    end_with_it(partial(remove, folder), work.granted.release)
+    listen(lambda _: work.granted.release(), partial(remove, folder))
     share_group()  # the parent ends all processes of this group
     use_at_most(order.threads)
     write_json(folder / ENDED, work.ended().as_json())

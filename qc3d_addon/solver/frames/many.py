@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..collision.crossings import CrossingSearch
 from ..errors import QC3DError
 from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import Ends, KeyPair, require_sizes
 from ..settings import FitOptions
-from ..support.memory import give_back
+from ..support.memory import announce, give_back
 from ..support.progress import Done
 from ..support.threads import alone, thread_count
 from .task import Outcome, Task, carry_out
@@ -67,6 +68,8 @@ class _Base:
             require_sizes(self.pair)
             cube = Cube.around(self.pair)
             volume = Volume.filled(Embedding.of(self.pair, cube), self.options, cube)
+            alone = replace(self.pair, key1=self.pair.key0)
+            volume = replace(volume, search=CrossingSearch(alone.welded_faces, [volume.key0]))
         except QC3DError:
             return None  # each of the keys says why
         # All of it now: later, two threads might make the same.
@@ -101,6 +104,11 @@ class _Bases:
         found = (made for base, made in zip(self.shared, self._volumes, strict=True) if base.is_of(pair, options))
         return next(found, None)
 
+    def sharing(self, pair: KeyPair, options: FitOptions) -> KeyPair:
+        """A pair of its own, whose results are dropped with it, except for those that it shares with others."""
+        base = next((base for base in self.shared if base.is_of(pair, options)), None)
+        return replace(pair) if base is None else pair.sharing(base.pair)
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -134,10 +142,18 @@ class Run:
         """Number of tasks that run at once: small meshes keep only one core busy each."""
         vertices = max((len(pair.key0) for task in self.tasks for pair in task.pairs.values()), default=0)
         most = 1 if vertices > _SMALL else max(1, min(thread_count(), len(self.tasks)))
-        needed = max((task.estimated_mb for task in self.tasks), default=0.0)
-        while most > 1 and self.memory_mb and needed * (1.0 + _MORE_OF_EACH * (most - 1)) > self.memory_mb:
+        while most > 1 and self.memory_mb and self._estimated_mb(most) > self.memory_mb:
             most -= 1
         return most
+
+    @property
+    def estimated_mb(self) -> float:
+        """Estimated peak memory of the run, in megabytes."""
+        return self._estimated_mb(self.at_once)
+
+    def _estimated_mb(self, at_once: int) -> float:
+        needed = max((task.estimated_mb for task in self.tasks), default=0.0)
+        return needed * (1.0 + _MORE_OF_EACH * (at_once - 1))
 
     def carried_out(self, failures: tuple[type[Exception], ...] = (QC3DError,)) -> Generator[Done | Ended, None, None]:
         """Carry out the tasks; yield how far they are, and each outcome as soon as it is there.
@@ -175,6 +191,7 @@ class Run:
     def outcomes(self, on_progress: Callable[[Done], object] | None = None) -> list[Outcome | QC3DError]:
         """Carry out the tasks; the outcome of each, in their order, or why there is none."""
         found: dict[int, Outcome | QC3DError] = {}
+        announce(self.estimated_mb)
         for step in self.carried_out():
             if isinstance(step, Done):
                 if on_progress is not None:
@@ -193,8 +210,8 @@ def _beside_each_other(
     stop = threading.Event()
 
     def work(number: int) -> None:
-        # With pairs of its own: what they compute and keep is dropped with the task.
-        pairs = {ends: replace(pair) for ends, pair in tasks[number].pairs.items()}
+        options = tasks[number].fit_options
+        pairs = {ends: bases.sharing(pair, options) for ends, pair in tasks[number].pairs.items()}
         task = replace(tasks[number], pairs=pairs)
         try:
             with alone() if at_once > 1 else nullcontext():

@@ -50,7 +50,7 @@ def main(folder: Path) -> None:
         shutil.copy(Path(__file__).with_name(script), folder)
         subprocess.run(["node", script, f"arm.{ending}", "times.json", "read.json"], cwd=folder, check=True)
         read = json.loads((folder / "read.json").read_text())
-        number = cKDTree(rest).query(_in_blenders_axes(read["rest"], unit))[1]
+        number = np.asarray(cKDTree(rest).query(_in_blenders_axes(read["rest"], unit))[1])
         frames = [_in_blenders_axes(points, unit) for points in read["frames"]]
         largest = np.linalg.norm(np.array(frames) - shown[:, number], axis=2).max()
         print(f"{script} arm.{ending}: {largest / size:.2g} of the size, {len(set(number))} of {len(rest)} vertices")

@@ -105,11 +105,11 @@ def small_maps(mesh: TetMesh, targets: Floats, error: float, boundary: ChosenBou
         found.append(_small_of(source, space, packed, mesh, targets))
         if any(found[-1].folds) and tries > 1:
             found.append(_small_of(source, space, replace(packed, is_unfolded=True), mesh, targets))
-        if not any(found[-1].folds) and found[-1].error <= error:
-            yield 1.0
-            return found[-1]
         if any(found[-1].folds):
             break  # it cannot be unfolded
+        if not found[-1].is_unfolded or found[-1].error <= error:
+            yield 1.0
+            return found[-1]
         # Unfolding has led farther away than was asked; it starts nearer now.
         asked *= _NEARER_TO_UNFOLD * error / found[-1].error
     yield 1.0
@@ -126,11 +126,6 @@ def _small_of(source: Source, space: Space, packed: Packed, mesh: TetMesh, targe
     folds = tuple(Mapping(mesh, values).folds for values in restored)
     errors = errors_of(restored, targets, diagonal_of(mesh.points))
     return Small(data, packed.field.part.kind, restored, errors, folds, packed.is_unfolded)
-
-
-def _share_of_tries(number: int, share: float) -> float:
-    """Of all work: each further try takes as long, and is less likely."""
-    return 1.0 - 0.5**number * (1.0 - 0.5 * share)
 
 
 def small_frames(frames: Floats, faces: Ints, error: float) -> Work:

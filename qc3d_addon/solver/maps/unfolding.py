@@ -25,7 +25,7 @@ _SPRINGS = (100.0, 10.0, 1.0)  # strengths, the strongest first: those that unfo
 _ROUNDS, _ITERATIONS = 8, 60
 _LEAST, _SLACK = 1e-3, 0.2  # e where there are no folds, and what it is over the deepest fold
 _DONE = 1e-3  # determinant
-_MOST_TETS = 300_000  # around the folds of one map: some seconds
+_MOST_TETS = 100_000  # around the folds of one map: some seconds
 
 
 def unfolded(mesh: TetMesh, values: Floats, free: Bools) -> Floats:

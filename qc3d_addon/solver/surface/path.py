@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
-from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned, mean_turns
+from ..numerics.rotation_unwrapping import consistent_turning, half_turned, mean_turns
 from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
@@ -153,10 +153,11 @@ class SurfacePath:
             self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
-        self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
+        self._moving_turning = self.turning.of(rows)
         values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
         self._moving_stretch = Stretch(by_component(values), by_component(vectors))
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
+        self.deformation = usable.without_directions()
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
         """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""

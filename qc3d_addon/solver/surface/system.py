@@ -14,12 +14,13 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Bools, Floats, Ints
-from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_elements
+from ..numerics.assembly import PerCoordinate, StiffnessPattern, stiffness_elements
 from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotations import by_component
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.deformation import TriangleDeformation
 from ..triangles.topology import distinct
+from .pieces import pieces_of
 from .volumes import MovingVolumes
 
 
@@ -48,13 +49,18 @@ class MovingSurface:
     Attributes
     ----------
     rows : (m,) int64
-        Indices, in the deformation, of the moving triangles: those with a moving corner.
+        Indices, in the deformation, of the moving triangles: those with a moving corner, in the order in which their
+        first corners are eliminated, so that neighbors in memory are neighbors on the surface.
     springs : (s,) int64
         Indices of the moving springs: those with a moving end.
     moving : (k,) int64
         The moving vertices, in the order of elimination.
     used : (l,) int64
         The moving vertices, followed by the still vertices next to them.
+    weights : (m,)
+        Of the moving triangles.
+    pieces : list of Piece
+        The moving triangles, in their order.
     """
 
     def __init__(
@@ -71,11 +77,11 @@ class MovingSurface:
         self.rows: Ints = np.flatnonzero(free[deformation.faces].any(axis=1))
         self.springs: Ints = np.flatnonzero(free[springs].any(axis=1))
         faces, edges = deformation.faces[self.rows], springs[self.springs]
-        self.weights = deformation.weights[self.rows]
-        self.hats = by_component(deformation.gradients[self.rows])
         spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(edges), 2, 2))
         stiffness = csr_array(
-            StiffnessPattern(faces, count).assemble(stiffness_elements(self.weights, self.hats))
+            StiffnessPattern(faces, count).assemble(
+                stiffness_elements(deformation.weights[self.rows], by_component(deformation.gradients[self.rows]))
+            )
             + StiffnessPattern(edges, count).assemble(spring)
         )
         moving = np.flatnonzero(free)
@@ -86,13 +92,16 @@ class MovingSurface:
         self.moving, self.used = moving, np.concatenate([moving, beside])
         number = np.zeros(count, dtype=np.int64)
         number[self.used] = np.arange(len(self.used))
-        self.faces = number[faces]
+        corners = number[faces]
+        in_order = np.argsort(corners.min(axis=1, initial=count), kind="stable")
+        self.rows, corners = self.rows[in_order], corners[in_order]
+        self.weights = deformation.weights[self.rows]
         self._stiffness = csr_array(stiffness[moving][:, moving])
-        self.stiffness_beside = csr_array(stiffness[moving][:, beside])
+        self.stiffness_beside = PerCoordinate(csr_array(stiffness[moving][:, beside]))
         self.volumes = MovingVolumes(closed, covering, moving, self.used)
-        self.gradient = gradient_operator(self.faces, self.hats, len(self.used))
+        self.pieces = pieces_of(corners, by_component(deformation.gradients[self.rows]), len(self.used))
         ends = np.tile([-1.0, 1.0], len(edges)), number[edges].ravel(), np.arange(0, 2 * len(edges) + 1, 2)
-        self.spans = csr_array(ends, shape=(len(edges), len(self.used)))
+        self.spans = PerCoordinate(csr_array(ends, shape=(len(edges), len(self.used))))
         self._factor(anchor_weights)
 
     def with_anchor_weights(self, anchor_weights: Floats) -> MovingSurface:

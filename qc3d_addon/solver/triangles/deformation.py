@@ -10,7 +10,7 @@ positions (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling").
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,9 +40,9 @@ class TriangleDeformation:
         Weights in least-squares fits: proportional to the square root of the area, so that small triangles keep their
         lengths too. Their sum is the area of the surface in the first key.
     bases : (m, 3, 3)
-        Columns: two tangents and the unit normal in the first key.
+        Columns: two tangents and the unit normal in the first key; empty where they are not needed any more.
     gradients : (m, 3, 2)
-        Gradients of the hat functions, in the tangent basis of the first key.
+        Gradients of the hat functions, in the tangent basis of the first key; likewise.
     stretch : Stretch
         Symmetric in-plane stretches (m, 2, 2) from the first key to the second.
     turns : (m, 3)
@@ -85,6 +85,10 @@ class TriangleDeformation:
         weights *= areas.sum() / max(float(weights.sum()), 1e-300)
         turns = rotation_vectors(rotations)
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
+
+    def without_directions(self) -> TriangleDeformation:
+        """The same without bases and gradients, which take half of the memory."""
+        return replace(self, bases=np.empty((0, 3, 3)), gradients=np.empty((0, 3, 2)))
 
 
 def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:

@@ -83,6 +83,20 @@ def areas(positions: Floats, faces: Ints) -> Floats:
     return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
 
 
+def edge_lengths(positions: Floats, edges: Ints) -> Floats:
+    """(e,) lengths of edges (e, 2) with ends at positions (n, 3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> edge_lengths(np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]), np.array([[0, 1]]))
+    array([5.])
+    """
+    spans = positions.take(edges[:, 1], axis=0)
+    spans -= positions.take(edges[:, 0], axis=0)
+    return np.sqrt(np.einsum("ij,ij->i", spans, spans))
+
+
 def vertex_areas(points: Floats, faces: Ints, shares: Floats | float = 1.0) -> Floats:
     """(n,) barycentric vertex areas: a third of the area of the triangles around each vertex.
 

@@ -241,6 +241,7 @@ class NaturalFrames:
             yield attempt / _UNCROSSING_ATTEMPTS
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
             remaining = list(in_threads(self._limit.excess, tried))
@@ -297,6 +298,7 @@ class NaturalFrames:
                 return pushed
             for near in nearby:
                 reach = np.maximum(reach, self._limit.faded(near))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             anchored = self._moments(volumes, moments)
             positions = self._all_shaped(

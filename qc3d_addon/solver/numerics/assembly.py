@@ -130,7 +130,7 @@ class PerCoordinate:
         if self._together > 1 and coordinates.ndim > 2:  # each product is for the coordinates of one shape
             return np.stack([self._applied(matrix, shape, rows) for shape in np.moveaxis(coordinates, 1, 0)], axis=1)
         parts = coordinates.reshape(-1 if matrix.shape[1] else 3 // self._together, matrix.shape[1])
-        return np.stack([matrix @ part for part in parts]).reshape(*coordinates.shape[:-1], rows)
+        return np.asarray(np.stack([matrix @ part for part in parts]).reshape(*coordinates.shape[:-1], rows))
 
 
 def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats | None = None) -> Floats:

@@ -60,9 +60,10 @@ class Turning:
             rotations = products(rotations, rotation_matrices(time * self.twist))
         return rotations
 
-    def of(self, chosen: Ints) -> Turning:
+    def part(self, chosen: Ints | slice) -> Turning:
         """The rotations of some of the elements."""
-        return Turning(self.swing[chosen], self.twist[chosen] if self.twist.any() else no_twist(len(chosen)))
+        swing = self.swing[chosen]
+        return Turning(swing, self.twist[chosen] if self.twist.any() else no_twist(len(swing)))
 
     def other_way(self, chosen: Bools) -> Turning:
         """The same rotations at 1, to which the ``chosen`` elements (m,) turn the other way round."""

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
+from ..numerics.blocks import in_blocks
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotation_unwrapping import consistent_turning, half_turned, mean_turns
 from ..numerics.rotations import by_component
@@ -102,9 +104,9 @@ class SurfacePath:
         self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
-        faces = self._group[embedding.pair.faces]
-        triangles, shares = embedding.pair.covering
-        triangles = self._group[triangles]
+        faces, (triangles, shares) = embedding.pair.faces, embedding.pair.covering
+        if count < len(self._group):
+            faces, triangles = self._group[faces], self._group[triangles]
         self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
@@ -153,7 +155,7 @@ class SurfacePath:
             self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
-        self._moving_turning = self.turning.of(rows)
+        self._moving_turning = self.turning.part(rows)
         values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
         self._moving_stretch = Stretch(by_component(values), by_component(vectors))
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
@@ -167,6 +169,10 @@ class SurfacePath:
         stronger._anchor_weights = self._anchor_weights * strongest
         stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
+
+    def release(self) -> None:
+        """Give up, on large surfaces, memory that will be filled again when it is needed."""
+        self._surface.release()
 
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates of rotation, stretch and volume at the first and at the second key."""
@@ -217,6 +223,7 @@ class SurfacePath:
         work = Sweeps(self._surface, wanted)
         settled = work.settled(sweeps)
         costly = np.flatnonzero(work.corrected > SMALL_CORRECTION).tolist()
+        del work  # the second sweeps must not need its memory in addition
         if costly:
             free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
             for shape, other in zip(costly, free, strict=True):
@@ -243,21 +250,27 @@ class SurfacePath:
 
     def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
-        stretch = self._moving_stretch.at(time, self._law)
         lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
         volumes = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
-        turn_change: Floats | float = 0.0
         if self._correction is not None:
-            rows = self._surface.rows
-            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
-            turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
-        tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
+        tangents, stretch = in_blocks(partial(self._wanted_triangles, time), len(self._surface.rows))
         lines = self._embedding.straight(time)[self.vertices]
         share = (self._line_weights / (self._anchor_weights + self._line_weights))[:, None]
         anchors = anchors + share * (lines - anchors)
         start = np.where(self._free[:, None], anchors, lines)
-        return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
+        return Wanted(start, tangents.transpose(1, 2, 0), stretch, anchors, lengths[self._surface.springs], volumes)
+
+    def _wanted_triangles(self, time: float, part: slice) -> tuple[Floats, Floats]:
+        """(p, 3, 2) the tangents and (p, 2, 2) the stretches of some moving triangles."""
+        stretch = self._moving_stretch.part(part).at(time, self._law)
+        change: Floats | float = 0.0
+        if self._correction is not None:
+            rows = self._surface.rows[part]
+            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
+            change = hermite(time, *(slope[rows] for slope in self._correction.turns))
+        rotations = self._moving_turning.part(part).at(time, change)
+        return tangents_of(rotations, self._moving_tangents[part]).transpose(2, 0, 1), stretch
 
 
 def _spans(positions: Floats, edges: Ints) -> Floats:

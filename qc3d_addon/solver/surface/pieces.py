@@ -86,7 +86,7 @@ class Operator(NamedTuple):
         part = positions[:, self.shapes][:, :, self.used]
         found = [self.gradient @ row for row in part.reshape(_COORDINATES // self.together, -1)]
         derivatives = found[0] if len(found) == 1 else np.stack(found)
-        return derivatives.reshape(_COORDINATES, part.shape[1], 2, -1).transpose(0, 2, 1, 3)
+        return np.asarray(derivatives.reshape(_COORDINATES, part.shape[1], 2, -1).transpose(0, 2, 1, 3))
 
     def add_spread(self, vectors: Floats, load: Floats) -> None:
         """Add to the load (3, q', l') what vectors (3, 2, q, p) on the triangles give their corners."""

@@ -9,9 +9,11 @@ left out of the system.
 from __future__ import annotations
 
 import copy
+from threading import Lock
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import SuperLU
 
 from ..arrays import Bools, Floats, Ints
 from ..numerics.assembly import PerCoordinate, StiffnessPattern, stiffness_elements
@@ -22,6 +24,8 @@ from ..triangles.deformation import TriangleDeformation
 from ..triangles.topology import distinct
 from .pieces import pieces_of
 from .volumes import MovingVolumes
+
+_MANY = 100_000  # moving vertices: factoring again takes no longer than a sweep
 
 
 class MovingSurface:
@@ -102,22 +106,33 @@ class MovingSurface:
         self.pieces = pieces_of(corners, by_component(deformation.gradients[self.rows]), len(self.used))
         ends = np.tile([-1.0, 1.0], len(edges)), number[edges].ravel(), np.arange(0, 2 * len(edges) + 1, 2)
         self.spans = PerCoordinate(csr_array(ends, shape=(len(edges), len(self.used))))
-        self._factor(anchor_weights)
+        self._use(anchor_weights)
 
     def with_anchor_weights(self, anchor_weights: Floats) -> MovingSurface:
         """The same system with other anchor weights (n,)."""
         other = copy.copy(self)
-        other._factor(anchor_weights)
+        other._use(anchor_weights)
         return other
 
-    def _factor(self, anchor_weights: Floats) -> None:
+    def _use(self, anchor_weights: Floats) -> None:
         self.anchor_weights = anchor_weights[self.moving]
-        self._factored = factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
+        self._making = Lock()
+        self._factors: SuperLU | None = self._made()
+
+    def _made(self) -> SuperLU:
+        return factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
+
+    def release(self) -> None:
+        """Give up the factors of a large surface, a third of all memory, until they are needed again."""
+        if len(self.moving) > _MANY:
+            self._factors = None
 
     def solve(self, loads: Floats) -> Floats:
         """(..., k) solutions for loads (..., k) on the moving vertices.
 
         Solving for many loads in one call is faster: the factors are read from memory once.
         """
+        with self._making:
+            factors = self._factors = self._factors or self._made()
         flat = loads.reshape(-1, loads.shape[-1])
-        return np.asarray(self._factored.solve(flat.T).T.reshape(loads.shape))
+        return np.asarray(factors.solve(flat.T).T.reshape(loads.shape))

@@ -10,7 +10,7 @@ through memory again and again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,7 @@ class Piece:
     triangles: slice
     used: slice | Ints
     gradient: csr_array
+    _plain: dict[int, tuple[csr_array, csc_array]] = field(default_factory=dict)
 
     @property
     def hats(self) -> Floats:
@@ -54,15 +55,21 @@ class Piece:
         Without stretches, of all these shapes as they are.
         """
         one, count = self.gradient, shapes.stop - shapes.start
-        if stretch is None:
-            values = np.tile(one.data, count)
-        else:
+        together = _COORDINATES if count * one.shape[0] * _COORDINATES <= 2 * TRIANGLES_IN_CACHE else 1
+        if stretch is not None:
             # Shape by shape: einsum over several would round differently depending on their number.
             parts = (np.einsum("mcb,mbd->dcm", self.hats, part[self.triangles]) for part in stretch[shapes])
             values = np.concatenate([part.transpose(0, 2, 1).ravel() for part in parts])
-        together = _COORDINATES if count * one.shape[0] * _COORDINATES <= 2 * TRIANGLES_IN_CACHE else 1
-        gradient = repeated(one, together * count, np.tile(values, together))
-        return Operator(shapes, self.triangles, self.used, gradient, gradient.T, together)
+            gradient = repeated(one, together * count, np.tile(values, together))
+            matrices = gradient, gradient.T
+        elif count not in self._plain:
+            gradient = repeated(one, together * count)
+            matrices = gradient, gradient.T
+            if together > 1:  # on large surfaces they would take more memory than time
+                self._plain[count] = matrices
+        else:
+            matrices = self._plain[count]
+        return Operator(shapes, self.triangles, self.used, *matrices, together)
 
 
 class Operator(NamedTuple):

@@ -91,6 +91,7 @@ class Sweeps:
         self._lengths = np.stack([shape.lengths for shape in wanted])
         self._missing_volumes = [shape.volumes - surface.volumes.resting(shape.start) for shape in wanted]
         self._volume_direction: Floats | None = None
+        self._found: list[tuple[Floats, Floats]] | None = None
 
     def settled(self, sweeps: int) -> list[Floats]:
         """(n, 3) positions of each shape, cube units, after the given number of sweeps."""
@@ -127,6 +128,14 @@ class Sweeps:
 
     def _move(self, moved: Floats) -> None:
         self._positions[:, :, self._moving] = moved
+        self._found = None
+
+    def _volumes_and_slopes(self) -> list[tuple[Floats, Floats]]:
+        """Of each shape, where it is now."""
+        if self._found is None:
+            shapes = self._positions.transpose(1, 0, 2)
+            self._found = [self._surface.volumes.with_slope(shape) for shape in shapes]
+        return self._found
 
     @cached_property
     def _few(self) -> list[slice]:
@@ -193,8 +202,7 @@ class Sweeps:
 
     def _with_volumes(self, moved: Floats) -> Floats:
         """(3, q, k) positions ``moved``, corrected so that every closed component has its volume to first order."""
-        volumes = self._surface.volumes
-        found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
+        volumes, found = self._surface.volumes, self._volumes_and_slopes()
         direction = self._direction()
         present, result = self._moved, np.empty_like(moved)
         for shape, (enclosed, slope) in enumerate(found):
@@ -208,8 +216,7 @@ class Sweeps:
         """Keep what volumes miss where they are looked at for the first time."""
         if not self._holds_volumes or self.corrected.any():
             return
-        shapes = self._positions.transpose(1, 0, 2)
-        found = np.stack([self._surface.volumes.with_slope(shape)[0] for shape in shapes])
+        found = np.stack([enclosed for enclosed, _ in self._volumes_and_slopes()])
         wanted = np.abs(np.stack([shape.volumes for shape in self._wanted]))
         missing = np.abs(np.stack(self._missing_volumes) - found)
         self.corrected = (missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0)
@@ -232,8 +239,8 @@ class Sweeps:
         if not self._holds_volumes:
             return
         for _ in range(_LAST_VOLUME_STEPS):
-            found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-            direction = self._direction()
+            found, direction = self._volumes_and_slopes(), self._direction()
+            self._found = None
             restored = True
             for shape, (enclosed, slope) in enumerate(found):
                 missing = self._missing_volumes[shape] - enclosed

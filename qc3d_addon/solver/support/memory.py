@@ -165,8 +165,25 @@ def give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
+_forgotten = 0.0  # a peak before the present work, where the system goes on telling it
+
+
+def forget_peak() -> None:
+    """Let ``peak_memory_mb`` tell the peak from now on, in a process that does one piece of work after the other."""
+    global _forgotten
+    try:
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # Linux
+    except OSError:
+        _forgotten = peak_memory_mb() or _forgotten
+
+
 def peak_memory_mb() -> float | None:
-    """Peak resident memory of this process in megabytes; None on Windows, which does not tell."""
+    """Peak resident memory of this process in megabytes; None where the system does not tell, as on Windows."""
+    found = _told_peak_mb()
+    return found if found is None or found > _forgotten else None
+
+
+def _told_peak_mb() -> float | None:
     try:  # Linux counts in ``ru_maxrss`` what the process was forked from, such as a large Blender
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
         return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 2**10

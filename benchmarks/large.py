@@ -5,7 +5,8 @@
     python -m benchmarks.large [PARTS ...] [--engine ENGINE] [--quality QUALITY] [--frames FRAMES]
 
 Every edge of the body of the data folder is divided into so many parts: 12 make a million vertices. The bake runs in a
-child process, as in Blender. The memory is the peak of the proportional set sizes (PSS) of all descendants of this process.
+child process, as in Blender. The memory is the peak of the proportional set sizes (PSS) of all descendants of this
+process.
 """
 
 from __future__ import annotations

@@ -6,9 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
+from qc3d_addon.solver.numerics.nested_dissection import factored
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.surface import system
 from qc3d_addon.solver.surface.sweeps import Sweeps, Wanted
 from qc3d_addon.solver.surface.system import MovingSurface
 from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
@@ -72,6 +75,22 @@ def test_other_anchor_weights_are_as_if_built_anew() -> None:
     free, loads = free_vertices(3), np.random.default_rng(3).normal(size=(1, int(free_vertices(3).sum())))
     changed = surface_of(free, np.ones(COUNT)).with_anchor_weights(np.linspace(1.0, 5.0, COUNT))
     assert np.array_equal(changed.solve(loads), surface_of(free, np.linspace(1.0, 5.0, COUNT)).solve(loads))
+
+
+def test_factors_that_were_given_up_are_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = surface_of(free_vertices(3), np.ones(COUNT))
+    loads = np.random.default_rng(3).normal(size=(1, len(surface.moving)))
+    before = surface.solve(loads)
+    made: list[csr_array] = []
+    monkeypatch.setattr(system, "factored", lambda matrix: made.append(matrix) or factored(matrix))
+    surface.release()
+    surface.solve(loads)
+    assert not made  # small ones are kept
+    monkeypatch.setattr(system, "_MANY", 1)
+    surface.release()
+    np.testing.assert_array_equal(surface.solve(loads), before)
+    surface.solve(loads)
+    assert len(made) == 1
 
 
 def test_gradients_of_a_linear_function_are_its_slopes() -> None:

@@ -18,17 +18,13 @@ ended. When standard input closes, the parent is gone, and this process ends.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import importlib.util
 import json
 import os
 import queue
-import signal
 import sys
 import tempfile
-import threading
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -45,9 +41,10 @@ def main(arguments: list[str]) -> None:
     name = _load(package)
     importlib.import_module(f"{name}.solver.support.guarded_program").share_group()
     private_folders = importlib.import_module(f"{name}.solver.files.private_folders")
-    leave = partial(_leave, partial(private_folders.remove, folder))
+    parent = importlib.import_module(f"{name}.worker.parent")
+    clear_up = partial(private_folders.remove, folder)
     requests: Requests = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, leave), daemon=True).start()
+    parent.listen(lambda line: requests.put(json.loads(line)), clear_up)
     if hasattr(os, "nice"):
         os.nice(_NICE)
     sys.path += [library for library in libraries if library not in sys.path]
@@ -61,7 +58,7 @@ def main(arguments: list[str]) -> None:
         try:
             request = requests.get(timeout=stay or None)
         except queue.Empty:
-            leave()
+            parent.leave(clear_up)
         memory.forget_peak()
         _limit_memory(request["memory"])  # after loading the libraries: OpenBLAS waits forever if it gets no memory
         for message in work.messages(job, recent):
@@ -69,17 +66,6 @@ def main(arguments: list[str]) -> None:
         if not stay:
             return
         memory.give_back()
-
-
-def _listen(requests: Requests, leave: Callable[[], None]) -> None:
-    """Hand on the requests of the parent until standard input closes; then it is gone."""
-    rest = b""
-    with contextlib.suppress(OSError):
-        while chunk := os.read(0, 4096):
-            *whole, rest = (rest + chunk).split(b"\n")
-            for line in whole:
-                requests.put(json.loads(line))
-    leave()
 
 
 def _load(package: Path) -> str:
@@ -99,14 +85,6 @@ def _load(package: Path) -> str:
 def _send(messages: BinaryIO, message: dict[str, Any]) -> None:
     messages.write(json.dumps(message).encode() + b"\0")
     messages.flush()
-
-
-def _leave(clear_up: Callable[[], None]) -> None:
-    """Clean up and end this process and all that it started."""
-    clear_up()
-    if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
-        os.killpg(os.getpid(), signal.SIGKILL)
-    os._exit(1)
 
 
 def _limit_memory(limit: int) -> None:

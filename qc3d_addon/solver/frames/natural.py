@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
-from itertools import chain
+from itertools import chain, islice
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..arrays import Bools, Floats, Ints
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
-from ..support.threads import batches, beside, in_threads
+from ..support.threads import Item, Result, batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SWEEPS, SurfacePath
 from .alignment import CalmAlignment, RigidMove
@@ -28,6 +28,7 @@ from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
+_ONE_BY_ONE = 500_000  # vertices: each frame that is solved beside another takes half a kilobyte for each
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
@@ -64,7 +65,7 @@ class NaturalFrames:
         self._mirror_images = MirrorImages(fitted.pair)
         if self._mirror_images:
             moment = self._moments([self._volume.at(0.5)], [0.5])
-            halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
+            halfway = self._spins.apply(self._surface.shapes(list(moment))[0], 0.5)
             self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
 
     @property
@@ -124,7 +125,7 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
-        shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
+        shape = self._shaped(self._surface, list(self._moments([self._volume.at(time)], [time])))[0]
         return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
@@ -136,7 +137,7 @@ class NaturalFrames:
         at_keys = np.isin(times, (0.0, 1.0))
         few = batches(times[~at_keys].tolist(), self._surface.shapes_at_once)
         few += [times[at_keys].tolist()] if at_keys.any() else []
-        for maps, shapes, crossing in in_threads(self._first_try, few):
+        for maps, shapes, crossing in self._side_by_side(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
@@ -184,7 +185,7 @@ class NaturalFrames:
         maps = self._volume.maps_at(times)
         at_keys = times[0] in (0.0, 1.0)
         sweeps = _SWEEPS_AT_KEYS if at_keys else SWEEPS
-        shapes = self._shaped(self._surface, self._moments(maps, times), sweeps)
+        shapes = self._shaped(self._surface, list(self._moments(maps, times)), sweeps)
         return maps, shapes, [0 if at_keys else self._limit.excess(shape) for shape in shapes]
 
     def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
@@ -215,17 +216,21 @@ class NaturalFrames:
         embedding = self._fitted.embedding
         return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time), time), time)
 
-    def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
-        few = batches(moments, surface.shapes_at_once)
-        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
+    def _all_shaped(self, surface: SurfacePath, moments: Iterable[tuple[float, Floats]], count: int) -> list[Floats]:
+        most, every = surface.shapes_at_once, iter(moments)
+        sizes = [len(part) for part in batches(range(count), most)]
+        few = (list(islice(every, size)) for size in sizes)
+        return list(chain.from_iterable(self._side_by_side(partial(self._shaped, surface), few)))
 
-    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
+    def _side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """Results of the work on each item: in threads, or one by one where each takes very much memory."""
+        return map(work, items) if len(self.still) > _ONE_BY_ONE else in_threads(work, items)
+
+    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> Iterator[tuple[float, Floats]]:
         """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
         landmarks, missed = self._fitted.landmarks, self._missed
-        return [
-            (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
-            for values, time in zip(maps, times, strict=True)
-        ]
+        for values, time in zip(maps, times, strict=True):
+            yield time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1])
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
@@ -243,8 +248,8 @@ class NaturalFrames:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
-            remaining = list(in_threads(self._limit.excess, tried))
+            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()), len(times))
+            remaining = list(self._side_by_side(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
                 break
             positions, excess = tried, remaining
@@ -300,14 +305,9 @@ class NaturalFrames:
                 reach = np.maximum(reach, self._limit.faded(near))
             self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            anchored = self._moments(volumes, moments)
-            positions = self._all_shaped(
-                surface,
-                [
-                    (time, np.where(reach[:, None] > 0.0, push, anchor))
-                    for (time, anchor), push in zip(anchored, pushed, strict=True)
-                ],
-            )
+            anchored = zip(self._moments(volumes, moments), pushed, strict=True)
+            held = ((time, np.where(reach[:, None] > 0.0, push, anchor)) for (time, anchor), push in anchored)
+            positions = self._all_shaped(surface, held, len(moments))
         return positions
 
 

@@ -49,6 +49,7 @@ SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
 _TRIANGLES_AT_ONCE = 150_000
+_MANY = 200_000  # triangles: large surfaces keep only what every frame needs
 
 
 class SurfacePath:
@@ -159,7 +160,9 @@ class SurfacePath:
         values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
         self._moving_stretch = Stretch(by_component(values), by_component(vectors))
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
-        self.deformation = usable.without_directions()
+        # Of many triangles, what only chains need is computed again for them.
+        many = len(usable.faces) > _MANY
+        self.deformation = usable.without_motion() if many else usable.without_directions()
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
         """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""
@@ -174,9 +177,17 @@ class SurfacePath:
         """Give up, on large surfaces, memory that will be filled again when it is needed."""
         self._surface.release()
 
+    def whole_deformation(self) -> TriangleDeformation:
+        """The deformation with its turns and stretches."""
+        if len(self.deformation.turns) == len(self.deformation.faces):
+            return self.deformation
+        triangles, shares = self._embedding.pair.covering
+        key1 = self._embedding.key1[self.vertices]
+        return TriangleDeformation.between(self._key0, key1, self._group[triangles], shares)
+
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates of rotation, stretch and volume at the first and at the second key."""
-        deformation = self.deformation
+        deformation = self.whole_deformation()
         spins = end_spins(self.turning.swing, self.turning.twist)
         slopes = stretch_slopes(deformation.stretch, self._law)
         growth = self._volumes[1] - self._volumes[0]
@@ -187,7 +198,7 @@ class SurfacePath:
 
     def with_end_rates(self, first: Rates, second: Rates) -> SurfacePath:
         """The same path between the same keys with other rates at its ends."""
-        deformation = self.deformation
+        deformation = self.whole_deformation()
         before, after = (own.toward(new) for own, new in zip(self.end_rates(), (first, second), strict=True))
         strain = deformation.spins.transpose(0, 2, 1) @ after.strain @ deformation.spins
         corrected = copy.copy(self)

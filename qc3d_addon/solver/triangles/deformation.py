@@ -103,6 +103,11 @@ class TriangleDeformation:
         """The same without bases and gradients, which take half of the memory."""
         return replace(self, bases=np.empty((0, 3, 3)), gradients=np.empty((0, 3, 2)))
 
+    def without_motion(self) -> TriangleDeformation:
+        """Only which triangles there are, and what they weigh."""
+        nothing = Stretch(np.empty((0, 2)), np.empty((0, 2, 2)))
+        return replace(self.without_directions(), stretch=nothing, turns=np.empty((0, 3)), angles=np.empty(0))
+
 
 def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
     """(m,) bound that twice the area of a usable triangle must exceed; ``double`` (m,) is twice the areas."""

@@ -9,7 +9,8 @@ import pytest
 
 from qc3d_addon.solver.keys.embedding import Embedding
 from qc3d_addon.solver.keys.keypair import KeyPair
-from qc3d_addon.solver.surface import pieces, volumes
+from qc3d_addon.solver.surface import path, pieces, volumes
+from qc3d_addon.solver.surface.end_rates import Rates
 from qc3d_addon.solver.surface.path import SurfacePath
 from qc3d_addon.solver.surface.pieces import pieces_of
 from qc3d_addon.solver.triangles.geometry import hat_gradients, tangent_bases
@@ -42,6 +43,23 @@ def test_small_pieces_have_the_gradients_and_loads_of_the_whole(monkeypatch: pyt
             np.testing.assert_allclose(of_part, gradients[:, :, shape, part.triangles], rtol=0.0, atol=1e-13)
             operator.add_spread(vectors[:, :, shape : shape + 1, part.triangles], found)
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-12)
+
+
+def test_what_a_large_surface_gave_up_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    embedding = Embedding.of(KeyPair.checked(BAR, bent(BAR, 0.8), FACES))
+    kept = SurfacePath(embedding)
+    monkeypatch.setattr(path, "_MANY", 10)
+    slim = SurfacePath(embedding)
+    assert not len(slim.deformation.turns)
+    for found, wanted in zip(slim.end_rates(), kept.end_rates(), strict=True):
+        np.testing.assert_array_equal(found.spin, wanted.spin)
+        np.testing.assert_array_equal(found.strain, wanted.strain)
+        np.testing.assert_array_equal(found.growth, wanted.growth)
+    first, second = kept.end_rates()
+    doubled = Rates(2.0 * first.spin, first.strain, first.growth)
+    np.testing.assert_array_equal(
+        slim.with_end_rates(doubled, second).positions(0.4), kept.with_end_rates(doubled, second).positions(0.4)
+    )
 
 
 def test_the_path_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,7 +110,7 @@ def divided(pair: KeyPair, parts: int) -> KeyPair:
     corners = [np.stack([low[right >= 0], upward, up[right >= 0]], axis=1)]
     corners.append(np.stack([right[downward], high[downward], up[downward]], axis=1))
     faces = number[:, np.concatenate(corners)].reshape(-1, 3)
-    return KeyPair.checked(*keys, faces)
+    return KeyPair.checked(keys[0], keys[1], faces)
 
 
 class PeakMemory:

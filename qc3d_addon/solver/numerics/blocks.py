@@ -28,7 +28,7 @@ def in_blocks(work: Callable[[slice], tuple[Floats, ...]], count: int) -> tuple[
 
     Examples
     --------
-    >>> in_blocks(lambda rows: (np.arange(100_000.0)[rows] ** 2,), 100_000)[0][-1]
+    >>> float(in_blocks(lambda rows: (np.arange(100_000.0)[rows] ** 2,), 100_000)[0][-1])
     9999800001.0
     """
     if count <= _ROWS:

@@ -62,7 +62,7 @@ class Results:
         return self.folder / ("_".join(parts) + suffix)
 
     def load(self, pair: Pair, method: str, *, current: bool = True) -> dict[str, Any] | None:
-        """The stored figures; None if there are none or, with ``current``, if they come from other sources or shapes."""
+        """The stored figures; None if there are none or, with ``current``, if sources or shapes were others."""
         path = self._path(pair, method, ".json")
         if not path.is_file():
             return None

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
-from . import analyze, bake, combine, compress, decompress, export, interpolate, reconstruct, reproduce, speech
+from . import analyze, bake, combine, compress, decompress, export, interpolate, reconstruct, replay, reproduce, speech
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    for command in (interpolate, combine, bake, export, analyze, reconstruct, compress, decompress, reproduce):
+    for command in (interpolate, combine, bake, export, analyze, reconstruct, compress, decompress, reproduce, replay):
         command.add_to(commands)
     return parser
 

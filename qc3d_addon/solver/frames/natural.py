@@ -29,6 +29,7 @@ from .volume_anchors import VolumeAnchors
 from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
+_HASTE = (2, 8, 8)  # of each: first nearer to the course of a chain, then nearer to the volume
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
@@ -250,12 +251,11 @@ class NaturalFrames:
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            is_carried = self._anchors.is_led and attempt == 0
-            anchored = self._anchors.aside(volumes, times.tolist(), reach, is_carried)
+            anchored = self._anchors.aside(volumes, times.tolist(), reach, _HASTE[attempt])
             tried = self._all_shaped(surface, anchored)
             remaining = list(in_threads(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
-                if is_carried:
+                if attempt == 0 and self._anchors.is_led:
                     continue
                 break
             positions, excess = tried, remaining

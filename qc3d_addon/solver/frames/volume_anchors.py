@@ -12,7 +12,6 @@ import numpy as np
 
 from ..arrays import Floats
 from ..fit.fitted_map import FittedMap
-from ..surface.end_rates import hermite
 from .course import Course
 from .volume_path import VolumePath
 
@@ -54,11 +53,12 @@ class VolumeAnchors:
         return [(time, self._course.lead(anchors, self._fitted.embedding, time)) for time, anchors in plain]
 
     def aside(
-        self, maps: Sequence[Floats] | Floats, times: Sequence[float], reach: Floats, is_carried: bool
+        self, maps: Sequence[Floats] | Floats, times: Sequence[float], reach: Floats, haste: int
     ) -> list[tuple[float, Floats]]:
         """The same, but within ``reach`` (n,), 0..1, those of the volume, whose parts do not cross.
 
-        If ``is_carried``, they are carried to where the course goes through the keys at the same speed.
+        They go through the keys at the speed of the course, and are themselves again the sooner the more ``haste``, at
+        least 2.
         """
         course, embedding = self._course, self._fitted.embedding
         plain = self._plain(maps, times)
@@ -66,9 +66,9 @@ class VolumeAnchors:
             return plain
         led = []
         for time, anchors in plain:
-            if is_carried:
-                change = embedding.vectors_to_cube(hermite(time, *self._slower), time)
-                anchors = anchors + course.share[:, None] * change
+            first, second = time * (1.0 - time) ** haste, (1.0 - time) * time**haste
+            change = embedding.vectors_to_cube(first * self._slower[0] - second * self._slower[1], time)
+            anchors = anchors + course.share[:, None] * change
             led.append((time, course.lead(anchors, embedding, time, (1.0 - reach) * course.share)))
         return led
 

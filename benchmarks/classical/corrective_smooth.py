@@ -26,21 +26,23 @@ def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> Floats:
 def _smoothed(rest: Floats, other: Floats, faces: Ints, values: Floats) -> Floats:
     import bpy
 
+    from qc3d_addon.blender.kinds import mesh_of, present
+
     mesh = bpy.data.meshes.new("rest")
     mesh.from_pydata(rest.tolist(), [], faces.tolist())
     obj = bpy.data.objects.new("rest", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    present(bpy.context.scene).collection.objects.link(obj)
     try:
         obj.shape_key_add(name="Basis", from_mix=False)
         key = obj.shape_key_add(name="other", from_mix=False)
-        key.data.foreach_set("co", np.ascontiguousarray(other, dtype=np.float32).ravel())
+        key.points.foreach_set("co", np.ascontiguousarray(other, dtype=np.float32).ravel())
         obj.modifiers.new("smooth", "CORRECTIVE_SMOOTH")
         made = []
         for value in values.tolist():
             key.value = value
             evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
             places = np.empty(3 * len(rest), dtype=np.float32)
-            evaluated.data.vertices.foreach_get("co", places)
+            mesh_of(evaluated).vertices.foreach_get("co", places)
             made.append(places.reshape(-1, 3).astype(np.float64))
         return np.stack(made)
     finally:

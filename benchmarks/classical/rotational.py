@@ -3,9 +3,9 @@
 """Arcs about one center: what morph targets of modeling programs call *rotational* mixing.
 
 The direction from the center to a vertex goes from one key to the other by the shortest arc at even speed, and the
-distance from the center is blended linearly. Cinema 4D's Pose Morph has a mixing *Rotational*, whose formula is not
-published; arcs about the axis of the object are what it shows. The center is the origin of the keys' coordinates, the
-place of that axis.
+distance from the center is blended linearly. Where there is no one arc, a vertex moves along a straight line. Cinema
+4D's Pose Morph has a mixing *Rotational*, whose formula is not published; arcs about the axis of the object are what
+it shows. The center is the origin of the keys' coordinates, the place of that axis.
 """
 
 from __future__ import annotations
@@ -25,10 +25,12 @@ def frames(key0: Floats, key1: Floats, times: ArrayLike) -> Floats:
         np.linalg.norm(second - first, axis=1, keepdims=True), np.linalg.norm(second + first, axis=1, keepdims=True)
     )
     sine = np.sin(angle)
-    bends = sine > 1e-9  # otherwise the arc is a line, or has no one plane
+    # Otherwise the arc is a line, has no one plane, or begins or ends at the center.
+    bends = (sine > 1e-9) & (length0 > 0.0) & (length1 > 0.0)
     made = []
     for time in np.asarray(times, dtype=np.float64).tolist():
         safe = np.where(bends, sine, 1.0)
-        before, after = (np.where(bends, np.sin(part * angle) / safe, part) for part in (1.0 - time, time))
-        made.append(((1.0 - time) * length0 + time * length1) * (before * first + after * second))
+        before, after = (np.sin(part * angle) / safe for part in (1.0 - time, time))
+        arc = ((1.0 - time) * length0 + time * length1) * (before * first + after * second)
+        made.append(np.where(bends, arc, (1.0 - time) * key0 + time * key1))
     return np.stack(made)

@@ -88,7 +88,7 @@ def write_bug_report(
         If the file cannot be written.
     """
     number = {name: str(k + 1) for k, name in enumerate(dict.fromkeys(through))}
-    fit, frame, play = map(asdict, options)
+    fit, frame, play = (asdict(each) for each in options)
     keys = [number[name] for name in through]
     settings = {"format": _FORMAT, "version": version, "keys": keys, "fit": fit, "frame": frame, "play": play}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:

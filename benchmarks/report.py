@@ -148,7 +148,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     for measure, name in zip(RIVALRY, ("lengths", "volume"), strict=True):
         said: list[Any] = [state for v in ours if (state := v.rivalry(measure)) != "-"]
         lines.append(
-            f"- Against both {' and '.join(NAMES[one] for one in CLASSICAL)} in {name}: better on "
+            f"- Against {' and '.join(NAMES[one] for one in CLASSICAL)}, where they were run, in {name}: better on "
             f"{said.count('better')} of {len(said)} pairs, not better but below the visible floor on "
             f"{said.count('below floor')}, worse on {said.count('worse')}."
         )

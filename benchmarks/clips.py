@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Chains beside an animator's own frames: keys at every third or sixth frame of a clip, and the frames between them.
 
-    python -m benchmarks.clips           # prints the table
-    python -m benchmarks.clips --write   # and writes it, and the picture, for docs/science/inbetweens.md
+    python -m benchmarks.clips
 
 The environment variable QC3D_DATA says where the clips are.
 """
@@ -19,14 +18,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline, interp1d
 
 import qc3d_addon as qc3d
-from qc3d_paper.drawing.sheets import Row, save_sheet
 
-from .catalogue import DATA, ROOT, Floats, Ints
+from .catalogue import DATA, Floats, Ints
 from .measures import count_crossings, diagonal, edge_lengths, edge_uses
-from .report import table, write_between_markers
+from .report import table
 
-WRITER = "benchmarks/clips.py"
-DOCUMENT, PICTURE = ROOT / "docs/science/inbetweens.md", ROOT / "docs/images/chain_wolf.png"
 CLIPS, STEPS = ("wolf_gallop", "fox_walk"), (3, 6)
 _NEAR = 1e-3  # of the time between two keys: how near to a key velocities are measured
 
@@ -77,8 +73,8 @@ def clip(name: str) -> tuple[Ints, Floats]:
         return stored["faces"].astype(np.int64), np.stack(frames).astype(np.float64)
 
 
-def rows_of(name: str, step: int) -> tuple[list[list[str]], dict[str, Floats]]:
-    """The rows of the table, and the frames of every method."""
+def rows_of(name: str, step: int) -> list[list[str]]:
+    """The rows of the table."""
     faces, truth = clip(name)
     truth = truth[: (len(truth) - 1) // step * step + 1]
     count, keys = len(truth), truth[::step]
@@ -90,7 +86,7 @@ def rows_of(name: str, step: int) -> tuple[list[list[str]], dict[str, Floats]]:
     edges = edge_uses(faces)[0]
     true_lengths = np.stack([edge_lengths(shape, edges) for shape in truth])
     crossings = [count_crossings(shape, faces) or 0 for shape in truth]
-    rows, made, unit = [], {}, 0.0
+    rows, unit = [], 0.0
     for title, method in METHODS.items():
         found = method(keys, faces, times)
         frames, before, after = found[:count], found[count : count + len(knots)], found[count + len(knots) :]
@@ -106,38 +102,15 @@ def rows_of(name: str, step: int) -> tuple[list[list[str]], dict[str, Floats]]:
             f"{off / unit:.2f}", f"{np.sqrt((wrong**2).mean()):.3f}", f"{np.percentile(wrong, 99):.3f}", str(more),
             f"{np.sqrt((jump**2).mean() / (speed**2).mean()):.3f}",
         ])  # fmt: skip
-        made[title] = frames
-    return rows, made
+    return rows
 
 
 def main() -> None:
-    """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help=f"write the table of {DOCUMENT.name} and its picture")
-    chosen = parser.parse_args()
-    rows = []
-    for step in STEPS:
-        for name in CLIPS:
-            more, made = rows_of(name, step)
-            rows += more
-            print("\n".join("  ".join(row) for row in more), flush=True)
-            if chosen.write and (name, step) == ("wolf_gallop", 6):
-                draw(name, step, made)
+    """Measure and print."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    rows = [row for step in STEPS for name in CLIPS for row in rows_of(name, step)]
     header = ["clip, keys", "method", "off", "of straight", "lengths, rms", "lengths, p99", "new crossings", "jump"]
-    if chosen.write:
-        write_between_markers(DOCUMENT, table(header, rows), WRITER)
-
-
-def draw(name: str, step: int, made: dict[str, Floats]) -> None:
-    """The frames from the second key to the third: what the animator made above what was computed."""
-    faces, truth = clip(name)
-    shown = slice(step, 2 * step + 1)
-    times = np.linspace(0.0, 1.0, step + 1)
-    rows = [("animator", truth), *((title, made[title]) for title in ("straight", "cubic spline, natural", "chain"))]
-    turned = [frames[shown][..., [0, 2, 1]] * np.array([1.0, -1.0, 1.0]) for _, frames in rows]
-    titles = [title.replace("cubic spline, natural", "spline") for title, _ in rows]
-    save_sheet([Row(title, faces, times, frames) for title, frames in zip(titles, turned, strict=True)],
-               "auto", 160, PICTURE)  # fmt: skip
+    print(table(header, rows))
 
 
 if __name__ == "__main__":

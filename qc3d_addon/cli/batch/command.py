@@ -22,7 +22,8 @@ from .. import speech
 from ..options import whole_number
 from ..version import version
 from . import child
-from .jobs import Job, read_jobs
+from .job import Job
+from .jobs import read_jobs
 from .orders import Ended, HowEnded, Order
 from .pools import Cluster, Pool, Processes
 from .records import State

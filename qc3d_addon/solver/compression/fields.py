@@ -65,7 +65,7 @@ class Space:
     @property
     def is_surface(self) -> bool:
         """Whether the cells are triangles."""
-        return self._cells.shape[1] == 3
+        return bool(self._cells.shape[1] == 3)
 
     def modes(self, count: int) -> tuple[Floats, ...]:
         """For each coordinate (n, k) modes that are 0 where it is known; k is at most ``count``."""

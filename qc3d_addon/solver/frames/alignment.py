@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a frame stands: its calm parts beside the straight lines between the keys.
+"""Where a frame stands: its calm parts beside the straight lines between the keys, or all of it beside a course.
 
 Lengths, turns and volumes tell a frame's shape and leave its place to weak anchors, so that where nothing is still the
-whole frame would drift. It is carried rigidly to where the vertices that travel least go straight.
+whole frame would drift. It is carried rigidly to where the vertices that travel least go straight. In a chain, the
+keys before and after tell more: as far as a frame follows its course, it is carried to where it is nearest to that.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from ..arrays import Floats
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.rotations import rotation_matrices, rotation_vectors
+from .course import Course
 
 # Vertices that travel less than this part of all count most.
 _CALM_PERCENTILE = 25.0
@@ -59,14 +61,16 @@ class RigidMove:
         shift = weights @ offsets
         # Differences, not positions, go into the moments: they are zero where the target is met, which counts most.
         spread, missing = shape - center, offsets - shift
-        turned, rotation = spread, np.eye(3)
-        floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
+        weighted = weights[:, None] * spread
+        spreads, moments = weighted.T @ spread, weighted.T @ missing
+        rotation = np.eye(3)
+        floor = _RIDGE * float(np.trace(spreads)) + 1e-300
         for _ in range(_STEPS):
-            spreads = turned.T @ (weights[:, None] * turned)
-            inertia = (np.trace(spreads) + floor) * np.eye(3) - spreads
-            moment = weights @ np.cross(turned, missing - (turned - spread))
-            step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
-            turned, rotation = turned @ step.T, step @ rotation
+            turned = rotation @ spreads @ rotation.T
+            left = rotation @ (moments + spreads @ (np.eye(3) - rotation.T))
+            inertia = (np.trace(turned) + floor) * np.eye(3) - turned
+            moment = np.array([left[1, 2] - left[2, 1], left[2, 0] - left[0, 2], left[0, 1] - left[1, 0]])
+            rotation = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0] @ rotation
         return cls(rotation_vectors(rotation[None])[0], center, shift)
 
     def scaled(self, part: float) -> RigidMove:
@@ -105,7 +109,9 @@ class CalmAlignment:
         self._embedding = embedding
         self._inner = (False, False)
         self._part = 0.0 if turns else _calm_part(embedding)
-        self._weights = _calm_weights(embedding.travel, embedding.weights)
+        self._course: Course | None = None
+        self._led = 0.0
+        self._weights = _weights(_calmness(embedding.travel), embedding)
 
     def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
@@ -113,12 +119,24 @@ class CalmAlignment:
         other._inner = inner
         return other
 
+    def along(self, course: Course) -> CalmAlignment:
+        """The same for a pair of a chain that follows a course, as far as that is followed."""
+        other = copy.copy(self)
+        areas = self._embedding.weights / self._embedding.weights.sum()
+        other._course, other._led = course, float(areas @ course.share)
+        calm = (1.0 - other._led) * _calmness(self._embedding.travel)
+        other._weights = _weights(calm + other._led * course.share, self._embedding)
+        return other
+
     def of(self, shape: Floats, time: float) -> RigidMove:
         """Where to carry a shape (n, 3) at ``time``, cube units."""
         if not self._part:
             return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
-        whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
-        return whole.scaled(self._part * self.onset(time))
+        target = self._embedding.straight(time)
+        if self._course is not None:
+            target = self._course.lead(target, self._embedding, time)
+        whole = RigidMove.between(shape, target, self._weights)
+        return whole.scaled(self._part * (self._led + (1.0 - self._led) * self.onset(time)))
 
     def onset(self, time: float) -> float:
         """The part of a move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
@@ -140,18 +158,14 @@ def _calm_part(embedding: Embedding) -> float:
     return part * part * (3.0 - 2.0 * part)
 
 
-def _calm_weights(travel: Floats, areas: Floats) -> Floats:
-    """(n,) weights with sum 1: still vertices before all, then those that travel least.
-
-    Parameters
-    ----------
-    travel : (n,)
-        Distances between the keys over the size of the first.
-    areas : (n,)
-        Positive.
-    """
+def _calmness(travel: Floats) -> Floats:
+    """(n,) in 0..1: most for the vertices that travel least; ``travel`` (n,) is relative to the size."""
     reach = float(np.percentile(travel, _CALM_PERCENTILE))
-    weights = np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2))
-    weights += (NEARLY_STILL / np.maximum(travel, STILL_TOLERANCE)) ** 4
-    weights *= areas
+    return np.asarray(np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2)))
+
+
+def _weights(calmness: Floats, embedding: Embedding) -> Floats:
+    """(n,) weights with sum 1: still vertices before all, then those with the most ``calmness`` (n,)."""
+    still = (NEARLY_STILL / np.maximum(embedding.travel, STILL_TOLERANCE)) ** 4
+    weights = (calmness + still) * embedding.weights
     return np.asarray(weights / weights.sum())

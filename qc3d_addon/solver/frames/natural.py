@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 
@@ -15,19 +15,23 @@ from ..arrays import Bools, Floats, Ints
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
-from ..support.threads import batches, beside, in_threads
+from ..support.threads import Item, Result, batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SWEEPS, SurfacePath
 from .alignment import CalmAlignment, RigidMove
+from .course import Course, shares_of_turns
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
 from .mirror_image import MirrorImages
 from .straighter import Straighter, more_than
+from .volume_anchors import VolumeAnchors
 from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
+_HASTE = (2, 8, 8)  # of each: first nearer to the course of a chain, then nearer to the volume
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
+_ONE_BY_ONE = 500_000  # vertices: each frame that is solved beside another takes half a kilobyte for each
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
@@ -56,13 +60,10 @@ class NaturalFrames:
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
         self._alignment = CalmAlignment(embedding, turns)
-        self._missed = [
-            key - fitted.landmarks @ self._volume.at(time)
-            for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
-        ]
+        self._anchors = VolumeAnchors(fitted, self._volume)
         self._mirror_images = MirrorImages(fitted.pair)
         if self._mirror_images:
-            moment = self._moments([self._volume.at(0.5)], [0.5])
+            moment = self._anchors.of([self._volume.at(0.5)], [0.5])
             halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
             self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
 
@@ -115,6 +116,23 @@ class NaturalFrames:
         changed._alignment = self._alignment.beside(inner)
         return changed
 
+    def course_share(self) -> Floats:
+        """(n,) how much the vertices may follow the course of a chain, 0..1; not at all with extra turns."""
+        if self._turns:
+            return np.zeros(len(self.still))
+        deformation, count = self._surface.deformation, len(self.still)
+        spins = [rates.spin for rates in self.end_rates()]
+        angles = np.linalg.norm(0.5 * (spins[0] + spins[1]), axis=1)
+        corners = self._fitted.pair.covering[0][self.rows]
+        return shares_of_turns(angles, deformation.weights, corners, count)
+
+    def along(self, course: Course) -> NaturalFrames:
+        """The same in-betweens, drawn to the course of the chain that they are part of."""
+        led = copy.copy(self)
+        led._anchors, led._alignment = self._anchors.along(course), self._alignment.along(course)
+        led._surface = self._surface.with_stronger_anchors(course.strength)
+        return led
+
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
         """The same in-betweens with velocities (n, 3) added at the two keys."""
         changed = copy.copy(self)
@@ -123,7 +141,7 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
-        shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
+        shape = self._shaped(self._surface, self._anchors.of([self._volume.at(time)], [time]))[0]
         return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
@@ -135,7 +153,7 @@ class NaturalFrames:
         at_keys = np.isin(times, (0.0, 1.0))
         few = batches(times[~at_keys].tolist(), self._surface.shapes_at_once)
         few += [times[at_keys].tolist()] if at_keys.any() else []
-        for maps, shapes, crossing in in_threads(self._first_try, few):
+        for maps, shapes, crossing in self._side_by_side(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
@@ -183,7 +201,7 @@ class NaturalFrames:
         maps = self._volume.maps_at(times)
         at_keys = times[0] in (0.0, 1.0)
         sweeps = _SWEEPS_AT_KEYS if at_keys else SWEEPS
-        shapes = self._shaped(self._surface, self._moments(maps, times), sweeps)
+        shapes = self._shaped(self._surface, self._anchors.of(maps, times), sweeps)
         return maps, shapes, [0 if at_keys else self._limit.excess(shape) for shape in shapes]
 
     def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
@@ -216,15 +234,11 @@ class NaturalFrames:
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         few = batches(moments, surface.shapes_at_once)
-        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
+        return list(chain.from_iterable(self._side_by_side(partial(self._shaped, surface), few)))
 
-    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
-        """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
-        landmarks, missed = self._fitted.landmarks, self._missed
-        return [
-            (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
-            for values, time in zip(maps, times, strict=True)
-        ]
+    def _side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """Results of the work on each item: in threads, or one by one where each takes very much memory."""
+        return map(work, items) if len(self.still) > _ONE_BY_ONE else in_threads(work, items)
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
@@ -240,10 +254,14 @@ class NaturalFrames:
             yield attempt / _UNCROSSING_ATTEMPTS
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
-            remaining = list(in_threads(self._limit.excess, tried))
+            anchored = self._anchors.aside(volumes, times.tolist(), reach, _HASTE[attempt])
+            tried = self._all_shaped(surface, anchored)
+            remaining = list(self._side_by_side(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
+                if attempt == 0 and self._anchors.is_led:
+                    continue
                 break
             positions, excess = tried, remaining
         return positions, excess
@@ -296,8 +314,9 @@ class NaturalFrames:
                 return pushed
             for near in nearby:
                 reach = np.maximum(reach, self._limit.faded(near))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            anchored = self._moments(volumes, moments)
+            anchored = self._anchors.of(volumes, moments)
             positions = self._all_shaped(
                 surface,
                 [

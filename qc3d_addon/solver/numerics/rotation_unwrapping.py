@@ -60,6 +60,11 @@ class Turning:
             rotations = products(rotations, rotation_matrices(time * self.twist))
         return rotations
 
+    def part(self, chosen: Ints | slice) -> Turning:
+        """The rotations of some of the elements."""
+        swing = self.swing[chosen]
+        return Turning(swing, self.twist[chosen] if self.twist.any() else no_twist(len(swing)))
+
     def other_way(self, chosen: Bools) -> Turning:
         """The same rotations at 1, to which the ``chosen`` elements (m,) turn the other way round."""
         if not chosen.any():
@@ -128,8 +133,15 @@ def consistent_turning(
     far = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)) > _MOST_SWING
     share = sums_by_label(forest.labels, weights * far) / sums_by_label(forest.labels, weights)
     twists = (share > _FAIR_SHARE)[forest.labels]
+    if not twists.any():
+        return Turning(vectors, no_twist(count))
     twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
     return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
+
+
+def no_twist(count: int) -> Floats:
+    """(count, 3) zeros, which take no memory."""
+    return np.broadcast_to(np.zeros(3), (count, 3))
 
 
 def half_turned(turning: Turning, weights: Floats, labels: Ints, rest: Floats) -> Ints:

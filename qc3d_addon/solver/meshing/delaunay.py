@@ -16,6 +16,9 @@ from .slivers import Effort, sliver_free
 
 # Tetrahedra grow fast away from the surface: more smoothing would only even this out.
 _EFFORT = Effort(sweeps=3, rounds=20)
+# Surfaces of fewer vertices hardly tell where a motion is not affine, and frames of a few flat quads depend on the
+# tetrahedra: those have to stay the same where keys change by a millionth of the size.
+_FEW = 200
 
 
 def delaunay_mesh(
@@ -41,6 +44,10 @@ def delaunay_mesh(
         surface = sample_surface(points, faces, resolution.spacing, rng)
         discarding = Discarding(resolution.spacing, options.threshold, options.sparsity)
         return sliver_free(sample_cube_as_published(surface, discarding, rng), discarding.around(surface), rng)
+    if len(points) < _FEW:
+        surface = sample_surface(points, faces, resolution.spacing, rng)
+        around = resolution.around(surface)
+        return sliver_free(sample_cube(surface, around, rng), around, rng)
     size = MotionSizes.of(points, faces, moved, resolution, rng)
     surface = sample_surface(points, faces, size.finest, rng, size)
     return sliver_free(sample_cube(surface, size, rng), size, rng, _EFFORT)

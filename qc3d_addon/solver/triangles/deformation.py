@@ -24,6 +24,9 @@ from .geometry import face_normals, hat_gradients, planar_jacobians, tangent_bas
 # largest coordinate. Three vertices in a line, as in a polygon with subdivided sides, make such triangles.
 _THINNEST = 1e-10
 _ROUNDING = 2.5e-7
+# Nor do those that become flatter by this factor from one key to the other, as in a mesh that is pressed flat: there a
+# millionth of the size would turn them by any angle.
+_PRESSED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,10 @@ class TriangleDeformation:
         What they count is multiplied by ``shares`` (m,).
         """
         double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
-        usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
+        longest = [_longest_sides(key, faces) for key in (key0, key1)]
+        usable = (double0 > _least_area(key0, double0, longest[0])) & (double1 > _least_area(key1, double1, longest[1]))
+        flatness = np.stack([double0 * longest[1] ** 2, double1 * longest[0] ** 2])
+        usable &= flatness.min(axis=0) > _PRESSED * flatness.max(axis=0)
         faces = faces[usable]
         bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
         gradients = hat_gradients(key0, faces, bases0)
@@ -87,10 +93,17 @@ class TriangleDeformation:
         return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
 
 
-def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
-    """(m,) bound that twice the area of a usable triangle must exceed; ``double`` (m,) is twice the areas."""
+def _longest_sides(key: Floats, faces: Ints) -> Floats:
+    """(m,) length of the longest side of each triangle."""
     corners = key[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0))
+
+
+def _least_area(key: Floats, double: Floats, longest: Floats) -> Floats:
+    """(m,) bound that twice the area of a usable triangle must exceed.
+
+    ``double`` (m,) is twice the areas, ``longest`` (m,) the longest sides.
+    """
     rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
     return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
 

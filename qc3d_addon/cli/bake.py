@@ -94,7 +94,28 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--colliders", default="", metavar="COLLECTION", help="objects that the in-betweens must not enter"
     )
     add_options(command, FrameOptions, FitOptions, PlayOptions)
-    command.set_defaults(run=_run)
+    command.set_defaults(run=_run, check=check)
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Raise InputError if the options do not go together; nothing is read for that."""
+    ways = [bool(arguments.on_keys), arguments.all_keys, _is_pair(arguments)]
+    if sum(ways) > 1 or not (sum(ways) or arguments.combine):
+        raise InputError(
+            "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
+        )
+    if arguments.together and not (ways[2] and not arguments.combine):
+        raise InputError("Objects are baked together from one key to another: name these by --from and --to.")
+    if ways[2] and not (arguments.first and arguments.last):
+        raise InputError("The following arguments are required: --from, --to; see qc3d bake --help.")
+    if not ways[2] and (arguments.keyframes or arguments.play_on == "slider"):
+        raise InputError("Keys that play in-betweens themselves take neither --keyframes nor --play-on slider.")
+    if arguments.tolerance is not None and not arguments.tolerance > 0.0:
+        raise InputError(f"The tolerance is {arguments.tolerance}; it must be a distance above 0.")
+
+
+def _is_pair(arguments: argparse.Namespace) -> bool:
+    return any((arguments.first, arguments.last, arguments.via))
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -103,14 +124,10 @@ def _run(arguments: argparse.Namespace) -> None:
         from ..blender.combinations.combine import combine
     except ImportError as error:
         raise InputError(f"Blender's Python module does not load: {error}.") from error
-    ways = [bool(arguments.on_keys), arguments.all_keys, any((arguments.first, arguments.last, arguments.via))]
-    if sum(ways) > 1 or not (sum(ways) or arguments.combine):
-        raise InputError(
-            "Name the keys in one way: --from and --to, --on-key, --all-keys, or --combine alone; see qc3d bake --help."
-        )
-    if arguments.together and not (ways[2] and not arguments.combine):
-        raise InputError("Objects are baked together from one key to another: name these by --from and --to.")
-    request = _request(arguments, is_pair=ways[2])
+    check(arguments)
+    is_pair = _is_pair(arguments)
+    has_way = is_pair or arguments.all_keys or bool(arguments.on_keys)
+    request = _request(arguments, is_pair)
     with StageBars() as bars:
 
         def bake_pair(obj: bpy.types.Object) -> tuple[list[str], Any]:
@@ -125,7 +142,7 @@ def _run(arguments: argparse.Namespace) -> None:
             return [f"{obj.name}: {verdict}" for verdict in verdicts], {"keys": values}
 
         def combine_keys(obj: bpy.types.Object) -> tuple[list[str], Any]:
-            said, values = (bake_pair if ways[2] else bake_keys)(obj) if any(ways) else ([], {})
+            said, values = (bake_pair if is_pair else bake_keys)(obj) if has_way else ([], {})
             for names in arguments.combine:
                 made = combine(obj, names, options=fit_options(arguments), on_progress=bars)
                 said.append(f"{obj.name}: {made.text}")
@@ -133,7 +150,7 @@ def _run(arguments: argparse.Namespace) -> None:
             return said, values
 
         def bake_one_by_one(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
-            one = combine_keys if arguments.combine else bake_pair if ways[2] else bake_keys
+            one = combine_keys if arguments.combine else bake_pair if is_pair else bake_keys
             return [one(obj) for obj in objects]
 
         def bake_together(objects: Sequence[bpy.types.Object]) -> list[tuple[list[str], Any]]:
@@ -143,7 +160,7 @@ def _run(arguments: argparse.Namespace) -> None:
         work = bake_together if arguments.together else bake_one_by_one
         told = bake_file(arguments.file, arguments.objects, work, arguments.output, arguments.report)
     sentences = [sentence for of_object in told for sentence in of_object]
-    if ways[2]:
+    if is_pair:
         print_notes(dict.fromkeys(sentences))
     else:
         for sentence in sentences:
@@ -154,12 +171,6 @@ def _request(arguments: argparse.Namespace, is_pair: bool) -> BakeRequest:
     """What to bake; of many keys everything but these."""
     from ..blender.bake.request import BakeRequest
 
-    if is_pair and not (arguments.first and arguments.last):
-        raise InputError("The following arguments are required: --from, --to; see qc3d bake --help.")
-    if not is_pair and (arguments.keyframes or arguments.play_on == "slider"):
-        raise InputError("Keys that play in-betweens themselves take neither --keyframes nor --play-on slider.")
-    if arguments.tolerance is not None and not arguments.tolerance > 0.0:
-        raise InputError(f"The tolerance is {arguments.tolerance}; it must be a distance above 0.")
     count = {"more": True} if arguments.frames is None else {"count": arguments.frames}
     return BakeRequest(
         key_names(arguments) if is_pair else _NO_KEYS,

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Sequence
-from importlib import metadata
-from pathlib import Path
 from typing import Any, NoReturn
 
-from ..solver.errors import InputError, QC3DError, on_one_line, reason, with_remedy
+from ..solver.errors import InputError, reason
 from . import analyze, bake, combine, compress, decompress, export, interpolate, reconstruct, reproduce, speech
+from .batch import command as batch
+from .failures import FAILURES, told
+from .version import version
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,23 +22,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0 after success; 1 if all files were written, but standard output could not be; 2 after an error, with one
-        sentence on standard error; 130 after an interruption.
+        sentence on standard error; 130 after an interruption. Or the status of the command itself.
     """
-    problem = None
+    problem, status = None, 0
     try:
         arguments = _parser().parse_args(argv)
-        arguments.run(arguments)
-    except QC3DError as error:
-        problem = str(error)
-    except MemoryError:
-        problem = "There is not enough memory; use fewer frames, a lower quality or a smaller mesh."
-    except OSError as error:
-        where = f" ({error.filename})" if error.filename else ""
-        problem = on_one_line(f"The system refuses to go on: {with_remedy(error)}{where}.")
-    except RuntimeError as error:
-        if "start new thread" not in str(error):
-            raise
-        problem = "The system allows no more threads; close some programs, or raise the limit (ulimit -u)."
+        status = arguments.run(arguments) or 0
+    except FAILURES as error:
+        problem = str(told(error))
     except KeyboardInterrupt:
         speech.note("Interrupted; nothing was written.")
         return 130
@@ -50,27 +41,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     if unheard is not None:
         speech.note(f"Standard output cannot be written: {reason(unheard)}; all files are complete.")
-        return 1
-    return 0
+        return status or 1
+    return status
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="qc3d", description="In-betweens between shapes of one mesh, through fold-free maps.")
-    parser.add_argument("--version", action="version", version=f"qc3d {_version()}")
+    parser.add_argument("--version", action="version", version=f"qc3d {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    for command in (interpolate, combine, bake, export, analyze, reconstruct, compress, decompress, reproduce):
+    every = (interpolate, combine, bake, batch, export, analyze, reconstruct, compress, decompress, reproduce)
+    for command in every:
         command.add_to(commands)
     return parser
-
-
-def _version() -> str:
-    """The version in the manifest, which is inside an installed extension, or next to the package in a checkout."""
-    package = Path(__file__).parent.parent
-    for manifest in (package / "blender_manifest.toml", package.parent / "blender_manifest.toml"):
-        if manifest.is_file():
-            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
-    return metadata.version("qc3d")
 
 
 class _Parser(argparse.ArgumentParser):

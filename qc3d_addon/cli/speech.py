@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from typing import TextIO
 
 _unheard: OSError | None = None
+_kept: list[str] | None = None
 
 
 def open_streams() -> None:
@@ -31,16 +32,33 @@ def open_streams() -> None:
 
 def say(text: str) -> None:
     """Write a line to standard output."""
+    if _kept is not None:
+        _kept.append(text)
+        return
     with _listening():
         print(text, flush=True)
 
 
 def note(text: str) -> None:
     """Write a sentence to standard error."""
+    if _kept is not None:
+        _kept.append(text)
+        return
     try:
         print(f"qc3d: {text}", file=sys.stderr, flush=True)
     except OSError:
         _silence(sys.stderr)
+
+
+@contextmanager
+def kept() -> Iterator[list[str]]:
+    """Context manager that keeps what is said and noted in a list, which it gives, in place of writing it."""
+    global _kept
+    earlier, _kept = _kept, []
+    try:
+        yield _kept
+    finally:
+        _kept = earlier
 
 
 def flush() -> None:

@@ -4,12 +4,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import queue
-import subprocess
-import sys
-import threading
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,27 +13,16 @@ from typing import Any, Generic, TypeVar, cast, overload
 from ..solver import errors
 from ..solver.combinations.corrections import Corrected, Corrections
 from ..solver.errors import QC3DError, WorkerError, with_remedy
-from ..solver.files.private_folders import PrivateFolder, temporary_place
+from ..solver.files.private_folders import temporary_place
 from ..solver.frames.many import Run
 from ..solver.frames.task import Outcome, Task
-from ..solver.support.child_python import interpreter
 from ..solver.support.progress import Done, OnProgress, Progress
-from . import messages
-from .exchange import (
-    folder_of,
-    read_corrected,
-    read_outcome,
-    write_corrections,
-    write_run,
-    write_task,
-)
+from .child import Child
+from .exchange import Job, folder_of, read_corrected, read_outcome, write_job
 from .idleness import LONGEST_IDLE, Idleness
-from .messages import Ending
-from .processes import how_it_ended, kill, library_folders
+from .standby import Standby
 
-CHILD = Path(__file__).with_name("task_child.py")
-_POLL_SECONDS = 0.05  # short beside any work, and long enough to take no processor time
-_LONGEST_MESSAGE = 1_000_000  # bytes; more without an end is not a message of ours
+_POLL_SECONDS = 0.02  # short beside any work, and long enough to take no processor time
 
 
 @dataclass(frozen=True)
@@ -59,7 +42,6 @@ class Limits:
 
 
 Outcomes = list[Outcome | QC3DError]
-Job = Task | Run | Corrections
 Result = TypeVar("Result", Outcome, Outcomes, Corrected)
 
 
@@ -72,6 +54,8 @@ class Worker(Generic[Result]):
         What to compute. The result of a task is its outcome; that of a run the outcome of each of its tasks, or why it
         has none; that of corrections the corrected shapes.
     limits : Limits, optional
+    standby : Standby, optional
+        Where the child is taken from, if one waits there, and kept afterwards. Without it, the child ends with the job.
 
     Raises
     ------
@@ -82,51 +66,38 @@ class Worker(Generic[Result]):
     """
 
     @overload
-    def __init__(self: Worker[Outcome], job: Task, limits: Limits | None = None) -> None: ...
+    def __init__(
+        self: Worker[Outcome], job: Task, limits: Limits | None = None, standby: Standby | None = None
+    ) -> None: ...
     @overload
-    def __init__(self: Worker[Outcomes], job: Run, limits: Limits | None = None) -> None: ...
+    def __init__(
+        self: Worker[Outcomes], job: Run, limits: Limits | None = None, standby: Standby | None = None
+    ) -> None: ...
     @overload
-    def __init__(self: Worker[Corrected], job: Corrections, limits: Limits | None = None) -> None: ...
+    def __init__(
+        self: Worker[Corrected], job: Corrections, limits: Limits | None = None, standby: Standby | None = None
+    ) -> None: ...
 
-    def __init__(self, job: Job, limits: Limits | None = None) -> None:
+    def __init__(self, job: Job, limits: Limits | None = None, standby: Standby | None = None) -> None:
         self._job = job
         self._limits = limits or Limits()
         job.require_memory(self._limits.memory_mb)
-        self._progress: Progress | Done | None = None
-        self._ending: Ending | None = None
-        self._ended_tasks: queue.SimpleQueue[Ending] = queue.SimpleQueue()
+        self._standby = standby
         self._arrived: dict[int, Outcome | QC3DError] = {}
-        self._is_garbled = False
-        self._is_closed = False
+        self._is_closed = self._is_spoiled = False
         try:
-            self._folder = PrivateFolder()
+            self._child = self._begun()
         except OSError as error:
             raise _not_started(error) from error
-        self._errors = self._folder.path / "errors.txt"
-        try:
-            if isinstance(job, Run):
-                write_run(self._folder.path, job)
-            elif isinstance(job, Corrections):
-                write_corrections(self._folder.path, job)
-            else:
-                write_task(self._folder.path, job)
-            self._process = self._start()
-        except OSError as error:
-            self._folder.close()
-            raise _not_started(error) from error
-        except BaseException:
-            self._folder.close()
-            raise
+        self._process, self._inbox = self._child.process, self._child.inbox
         self._idleness = Idleness(self._process.pid)
         self._seconds = self._limits.seconds * (max(len(job.tasks), 1) if isinstance(job, Run) else 1)
         self._deadline = clock.monotonic() + self._seconds
-        self._reader = threading.Thread(target=self._read_messages, daemon=True)
-        self._reader.start()
 
     @property
     def progress(self) -> Progress | Done | None:
         """The latest progress; None before the first report."""
-        return self._progress
+        return self._inbox.progress
 
     def poll(self) -> Result | None:
         """The result of the job, or None while it is running.
@@ -152,9 +123,9 @@ class Worker(Generic[Result]):
         return [self._arrived.get(number, otherwise) for number in range(len(self._job.tasks))]
 
     def _polled(self) -> Outcome | Outcomes | Corrected | None:
-        if self._process.poll() is None:
+        if not self._has_ended():
             self._collect()
-            if self._is_garbled:
+            if self._inbox.is_garbled:
                 self.close()
                 raise WorkerError(_GARBLED)
             if self._idleness.lasts_too_long:
@@ -167,119 +138,94 @@ class Worker(Generic[Result]):
                     "add-on's preferences, or choose a lower quality."
                 )
             return None
-        kill(self._process)  # processes that the child started may outlive it and keep the pipe open
-        self._reader.join()
         try:
             self._collect()
-            return self._result()
+            result = self._result()
         finally:
             self.close()
+        return result
+
+    def _has_ended(self) -> bool:
+        """Whether the job has ended: a child that stays has said so, any other has ended itself."""
+        return (self._standby is not None and self._inbox.ending is not None) or self._child.has_ended()
 
     def _collect(self) -> None:
         """Read the outcomes of the tasks of a run that have ended since."""
-        while not self._is_closed and not self._ended_tasks.empty():
-            task, error = self._ended_tasks.get()
+        while not self._is_closed and not self._inbox.ended_tasks.empty():
+            task, error = self._inbox.ended_tasks.get()
             if not isinstance(self._job, Run) or task is None or task >= len(self._job.tasks):
-                self._is_garbled = True
+                self._inbox.is_garbled = True
             elif error is not None:
                 self._arrived[task] = self._error(error)
             else:
                 try:
-                    found = self._read(folder_of(self._folder.path, task), self._job.tasks[task])
+                    found = self._read(folder_of(self._child.job, task), self._job.tasks[task])
                     self._arrived[task] = cast("Outcome", found)
                 except WorkerError as unreadable:
                     self._arrived[task] = unreadable
 
-    @staticmethod
-    def _read(folder: Path, job: Task | Corrections) -> Outcome | Corrected:
+    def _read(self, folder: Path, job: Task | Corrections) -> Outcome | Corrected:
         try:
             return read_corrected(folder, job) if isinstance(job, Corrections) else read_outcome(folder, job)
         except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+            self._is_spoiled = True
             raise WorkerError(f"The result of the work cannot be read: {error}; run it again.") from error
 
     def _error(self, told: tuple[str, str]) -> QC3DError:
         """The error that the child told by its type and its sentence."""
         kind, sentence = told
         if kind == MemoryError.__name__:
-            return WorkerError(_out_of_memory(self._limits))
-        known = getattr(errors, kind, None)
-        return known(sentence) if isinstance(known, type) and issubclass(known, QC3DError) else WorkerError(sentence)
+            error: QC3DError = WorkerError(_out_of_memory(self._limits))
+        else:
+            known = getattr(errors, kind, None)
+            if not (isinstance(known, type) and issubclass(known, QC3DError)):
+                known = WorkerError
+            error = known(sentence)
+        # What is not about the job, but about memory or files, may befall the next one too.
+        self._is_spoiled |= isinstance(error, WorkerError)
+        return error
 
     def close(self) -> None:
-        """Stop the child if it is still running, and remove its files. Calling it again does nothing."""
+        """Stop the child, unless it has done its job and stays, and remove the job's files; again, do nothing."""
         if self._is_closed:
             return
         self._is_closed = True
-        kill(self._process)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
-        self._reader.join()
-        self._process.stdout.close()
-        self._folder.close()
-
-    def _start(self) -> subprocess.Popen[bytes]:
-        python = interpreter()
-        if python is None:
-            raise WorkerError(
-                "No Python interpreter was found for the background process; install Blender with its own Python."
-            )
-        package = Path(__file__).resolve().parent.parent
-        memory = self._limits.memory_mb * 2**20
-        # Without the interpreter's own packages: the child must use the same libraries as this process.
-        command = [python, "-I", "-S", CHILD, package, self._folder.path, memory, *library_folders()]
-        flags = 0
-        if sys.platform == "win32":
-            flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-            flags |= subprocess.BELOW_NORMAL_PRIORITY_CLASS  # the window that the user works in comes first
-        with open(self._errors, "wb") as stream:
-            return subprocess.Popen(
-                [str(part) for part in command],
-                stdin=subprocess.PIPE,  # never written to: when it closes, the child knows that this process is gone
-                stdout=subprocess.PIPE,
-                stderr=stream,
-                creationflags=flags,
-                start_new_session=sys.platform != "win32",
-            )
-
-    def _read_messages(self) -> None:
-        """Read messages until the child closes the pipe; keep the latest progress and the final message."""
-        stream = self._process.stdout
-        assert stream is not None
-        rest = b""
-        while chunk := os.read(stream.fileno(), 65536):
-            if self._is_garbled:
-                continue  # keep reading: a child that cannot write would never end
-            *whole, rest = (rest + chunk).split(b"\0")
-            for text in whole:
-                self._take(text)
-            self._is_garbled |= len(rest) > _LONGEST_MESSAGE
-
-    def _take(self, text: bytes) -> None:
-        try:
-            message = messages.parsed(text)
-        except (ValueError, TypeError, RecursionError):
-            self._is_garbled = True
-            return
-        if not isinstance(message, Ending):
-            self._progress = message
-        elif message.task is None:
-            self._ending = message
+        if self._standby is None or self._inbox.ending is None or self._inbox.is_garbled or self._is_spoiled:
+            self._child.close()
         else:
-            self._ended_tasks.put(message)
+            self._child.put_away()
+            self._standby.keep(self._child)
+
+    def _begun(self) -> Child:
+        """The child that does the job: the one that was kept, if it can still be told, or else a new one."""
+        kept = None if self._standby is None else self._standby.taken()
+        if kept is not None:
+            if self._is_handed_to(kept):
+                return kept
+            kept.close()
+        child = Child(0.0 if self._standby is None else self._standby.stay)
+        self._is_handed_to(child)  # one that has ended already says itself how
+        return child
+
+    def _is_handed_to(self, child: Child) -> bool:
+        try:
+            write_job(child.take_new_job(), self._job)
+            return child.begin(self._limits.memory_mb * 2**20)
+        except BaseException:
+            child.close()
+            raise
 
     def _result(self) -> Outcome | Outcomes | Corrected:
-        ending, status = self._ending, self._process.returncode
-        if self._is_garbled:
+        ending = self._inbox.ending
+        if self._inbox.is_garbled:
             raise WorkerError(_GARBLED)
         if ending is not None and ending.error is not None:
             raise self._error(ending.error)
-        if ending is None or status != 0:
-            raise WorkerError(how_it_ended(status, self._errors))
+        if ending is None or (self._standby is None and self._process.returncode != 0):
+            raise WorkerError(self._child.how_it_ended())
         if isinstance(self._job, Run):
             return self.outcomes(WorkerError(_GARBLED))
-        return self._read(self._folder.path, self._job)
+        return self._read(self._child.job, self._job)
 
 
 _HANGS = (
@@ -306,13 +252,28 @@ def _out_of_memory(limits: Limits) -> str:
 
 
 @overload
-def run(job: Task, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Outcome: ...
-@overload
-def run(job: Corrections, on_progress: OnProgress | None = None, limits: Limits | None = None) -> Corrected: ...
-@overload
-def run(job: Run, on_progress: Callable[[Done], object] | None = None, limits: Limits | None = None) -> Outcomes: ...
 def run(
-    job: Job, on_progress: Callable[..., object] | None = None, limits: Limits | None = None
+    job: Task, on_progress: OnProgress | None = None, limits: Limits | None = None, standby: Standby | None = None
+) -> Outcome: ...
+@overload
+def run(
+    job: Corrections,
+    on_progress: OnProgress | None = None,
+    limits: Limits | None = None,
+    standby: Standby | None = None,
+) -> Corrected: ...
+@overload
+def run(
+    job: Run,
+    on_progress: Callable[[Done], object] | None = None,
+    limits: Limits | None = None,
+    standby: Standby | None = None,
+) -> Outcomes: ...
+def run(
+    job: Job,
+    on_progress: Callable[..., object] | None = None,
+    limits: Limits | None = None,
+    standby: Standby | None = None,
 ) -> Outcome | Outcomes | Corrected:
     """Carry out a job in a child process and wait for its result.
 
@@ -321,7 +282,7 @@ def run(
     QC3DError
         As ``Worker`` and ``Worker.poll``.
     """
-    worker: Worker[Any] = Worker(job, limits)
+    worker: Worker[Any] = Worker(job, limits, standby)
     shown = None
     try:
         while True:

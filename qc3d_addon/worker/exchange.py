@@ -23,9 +23,28 @@ from ..solver.keys.halves import MirrorPlane
 from ..solver.keys.keypair import KeyPair
 from ..solver.settings import FitOptions, FrameOptions, PlayOptions
 
+Job = Task | Run | Corrections
+
 _PAIR = ("key0", "key1", "faces", "edges", "polygons")
 _OF_CORRECTIONS = ("base", "alone", "sculpted", "places", "values", "faces", "edges")
 _TASK, _OUTCOME, _RUN, _CORRECTIONS = "task.json", "outcome.json", "run.json", "corrections.json"
+
+
+def write_job(folder: Path, job: Job) -> None:
+    """Write a job of any kind into an empty folder; ``read_job`` reads it."""
+    if isinstance(job, Run):
+        write_run(folder, job)
+    elif isinstance(job, Corrections):
+        write_corrections(folder, job)
+    else:
+        write_task(folder, job)
+
+
+def read_job(folder: Path) -> Job:
+    """Read the job that ``write_job`` wrote."""
+    if (folder / _RUN).exists():
+        return read_run(folder)
+    return read_corrections(folder) if (folder / _CORRECTIONS).exists() else read_task(folder)
 
 
 def write_run(folder: Path, run: Run) -> None:
@@ -47,11 +66,6 @@ def read_run(folder: Path) -> Run:
         first = next(iter(tasks[0].pairs.values())) if tasks else None
         tasks.append(read_task(folder_of(folder, number), first))
     return Run(tuple(tasks), header["memory_mb"])
-
-
-def is_run(folder: Path) -> bool:
-    """Whether the folder holds a run."""
-    return (folder / _RUN).exists()
 
 
 def folder_of(folder: Path, number: int) -> Path:
@@ -123,11 +137,6 @@ def read_corrections(folder: Path) -> Corrections:
     with np.load(folder / "keys.npz", allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in _OF_CORRECTIONS}
     return Corrections(**arrays, find_order=header["find_order"], fit_options=FitOptions(**header["fit_options"]))
-
-
-def is_of_corrections(folder: Path) -> bool:
-    """Whether the folder holds what is wanted of keys that are on at once."""
-    return (folder / _CORRECTIONS).exists()
 
 
 def write_corrected(folder: Path, made: Corrected) -> None:

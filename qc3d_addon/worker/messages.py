@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import queue
 from typing import Any, NamedTuple
 
 from ..solver.support.progress import STAGES, Done, Progress
@@ -26,6 +27,44 @@ class Ending(NamedTuple):
 
 
 Message = Progress | Done | Ending
+
+
+class Inbox:
+    """What a child has said about one job.
+
+    Attributes
+    ----------
+    progress : Progress, Done or None
+        The latest progress; None before the first report.
+    ending : Ending or None
+        How the job ended; None before.
+    ended_tasks : queue of Ending
+        How tasks of a run ended, which nobody has looked at yet.
+    is_garbled : bool
+        Whether something was not a message.
+    """
+
+    def __init__(self) -> None:
+        self.progress: Progress | Done | None = None
+        self.ending: Ending | None = None
+        self.ended_tasks: queue.SimpleQueue[Ending] = queue.SimpleQueue()
+        self.is_garbled = False
+
+    def take(self, text: bytes) -> None:
+        """Take a message in; nothing may follow the ending."""
+        try:
+            message = parsed(text)
+        except (ValueError, TypeError, RecursionError):
+            self.is_garbled = True
+            return
+        if self.ending is not None:
+            self.is_garbled = True
+        elif not isinstance(message, Ending):
+            self.progress = message
+        elif message.task is None:
+            self.ending = message
+        else:
+            self.ended_tasks.put(message)
 
 
 def as_json(message: Message) -> dict[str, Any]:

@@ -42,9 +42,12 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def how_it_ended(status: int, errors_file: Path) -> str:
-    """A sentence about a child that ended without a result; its last message is in the file of its errors."""
-    text = errors_file.read_text(encoding="utf-8", errors="replace") if errors_file.exists() else ""
+def how_it_ended(status: int, errors_file: Path, since: int = 0) -> str:
+    """A sentence about a child that ended without a result; its last message is in the file of its errors.
+
+    Only what follows the first ``since`` bytes of the file counts.
+    """
+    text = errors_file.read_bytes()[since:].decode(errors="replace") if errors_file.exists() else ""
     lines = text.strip().splitlines()
     if status < 0:
         name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"

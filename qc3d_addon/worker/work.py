@@ -8,8 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ..solver.combinations.corrections import Corrections
 from ..solver.errors import QC3DError, with_remedy
-from ..solver.frames.many import Ended
+from ..solver.fit.recent import RecentFits
+from ..solver.frames.many import Ended, Run
+from ..solver.frames.task import Task
 from . import exchange
 from .messages import Ending, Message, as_json
 
@@ -18,14 +21,15 @@ _WORDS_OF_TOO_LITTLE_MEMORY = ("start new thread", "malloc", "memory")
 _KNOWN = (QC3DError, MemoryError, OSError, RuntimeError)
 
 
-def messages(folder: Path) -> Iterator[dict[str, Any]]:
-    """Do the work and yield its messages, the last of which says how it ended.
+def messages(folder: Path, recent: RecentFits) -> Iterator[dict[str, Any]]:
+    """Do the work in a folder and yield its messages, the last of which says how it ended.
 
-    An error that is a bug is raised: it ends the process, whose parent says so.
+    ``recent`` are the maps of earlier jobs. An error that is a bug is raised: it ends the process, and its parent says
+    so.
     """
     try:
-        work = _run if exchange.is_run(folder) else _corrections if exchange.is_of_corrections(folder) else _task
-        for message in work(folder):
+        job = exchange.read_job(folder)
+        for message in _run(folder, job) if isinstance(job, Run) else _alone(folder, job, recent):
             yield as_json(message)
     except _KNOWN as error:
         yield as_json(Ending(None, _told(error)))
@@ -33,18 +37,15 @@ def messages(folder: Path) -> Iterator[dict[str, Any]]:
         yield as_json(Ending(None, None))
 
 
-def _task(folder: Path) -> Iterator[Message]:
-    outcome = yield from exchange.read_task(folder).carried_out()
-    exchange.write_outcome(folder, outcome)
+def _alone(folder: Path, job: Task | Corrections, recent: RecentFits) -> Iterator[Message]:
+    if isinstance(job, Corrections):
+        exchange.write_corrected(folder, (yield from job.carried_out()))
+    else:
+        exchange.write_outcome(folder, (yield from job.carried_out(recent)))
 
 
-def _corrections(folder: Path) -> Iterator[Message]:
-    made = yield from exchange.read_corrections(folder).carried_out()
-    exchange.write_corrected(folder, made)
-
-
-def _run(folder: Path) -> Iterator[Message]:
-    for step in exchange.read_run(folder).carried_out(_KNOWN):
+def _run(folder: Path, run: Run) -> Iterator[Message]:
+    for step in run.carried_out(_KNOWN):
         if not isinstance(step, Ended):
             yield step
         elif isinstance(step.outcome, Exception):

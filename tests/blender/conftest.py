@@ -16,6 +16,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="Blender's Python module is not installed")
 
 import qc3d_addon  # noqa: E402
+from qc3d_addon.blender.bake import jobs  # noqa: E402
 from qc3d_addon.blender.keys import drivers  # noqa: E402
 from qc3d_addon.blender.keys.control import slider_path  # noqa: E402
 from qc3d_addon.blender.store import records  # noqa: E402
@@ -72,10 +73,11 @@ def work_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _work_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run(job: Task | Run, on_progress: Callable[..., None] | None, limits: object) -> object:
+    def run(job: Task | Run, on_progress: Callable[..., None] | None, *_: object) -> object:
         return job.outcomes(on_progress) if isinstance(job, Run) else finish(carry_out(job), on_progress)
 
     monkeypatch.setattr(client, "run", run)
+    monkeypatch.setattr(jobs, "prepare", lambda: None)
 
 
 @pytest.fixture

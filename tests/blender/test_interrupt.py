@@ -16,7 +16,7 @@ import bpy
 import pytest
 
 from qc3d_addon.blender import cli
-from qc3d_addon.worker import client
+from qc3d_addon.worker import child, client
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals as Linux and macOS do")
 
@@ -76,7 +76,7 @@ def test_each_ending_of_the_child_leaves_the_file_as_it_was(
 ) -> None:
     script = temporary / "child.py"
     script.write_text(f"import os, signal, sys, time\n{line}\n")
-    monkeypatch.setattr(client, "CHILD", script)
+    monkeypatch.setattr(child, "CHILD", script)
     before = state()
     with pytest.raises(RuntimeError, match=said):
         bpy.ops.qc3d.bake_inbetweens(play_on="slider", **CHOICES)

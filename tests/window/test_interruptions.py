@@ -102,14 +102,22 @@ def test_disabling_the_addon_ends_the_bake(window: Window) -> None:
     window.ask("bpy.ops.preferences.addon_enable(module=ADDON)")
     assert window.ask("state()") == before
     window.open_sidebar()
-    start(window)
+    child = start(window)
     window.wait_for("job() is None")
     assert len(window.ask("names()")) == 8
+    assert is_alive(child)
+    window.ask("bpy.ops.preferences.addon_disable(module=ADDON)")
+    assert not is_alive(child)
+    window.ask("bpy.ops.preferences.addon_enable(module=ADDON)")
 
 
+@pytest.mark.parametrize("has_ended", [False, True], ids=["during a bake", "after a bake"])
 @pytest.mark.parametrize("how", ["quits", "is killed"])
-def test_nothing_outlives_blender(own_window: Window, how: str) -> None:
-    child = start(own_window, "finest")
+def test_nothing_outlives_blender(own_window: Window, how: str, has_ended: bool) -> None:
+    child = start(own_window, "normal" if has_ended else "finest")
+    if has_ended:
+        own_window.wait_for("job() is None")
+        assert is_alive(child)
     if how == "quits":
         with contextlib.suppress(ConnectionError):  # Blender may answer first
             own_window.ask("bpy.ops.wm.quit_blender()")

@@ -21,7 +21,7 @@ from qc3d_addon.solver.frames.bake import evenly_spaced
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.support.progress import Progress, finish
-from qc3d_addon.worker import client, idleness
+from qc3d_addon.worker import child, client, exchange, idleness
 from qc3d_addon.worker.client import Limits, Worker
 
 from ..solver.meshes import box_surface, twisted
@@ -52,7 +52,7 @@ def temporary(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, temporary: Path) -> Path:
     """A file that plays the child program."""
     script = tmp_path / "child.py"
-    monkeypatch.setattr(client, "CHILD", script)
+    monkeypatch.setattr(child, "CHILD", script)
     return script
 
 
@@ -247,7 +247,7 @@ class TestTheRealChild:
     def test_too_large_a_task_is_refused_before_it_starts(
         self, temporary: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(client.subprocess, "Popen", None)
+        monkeypatch.setattr(child.subprocess, "Popen", None)
         with pytest.raises(InputError, match=r"The bake of 58 vertices needs about \d+ MB .* limit is 20 MB"):
             client.run(small_task(), None, Limits(memory_mb=20))
         assert list(temporary.iterdir()) == []
@@ -307,7 +307,7 @@ def test_no_room_for_the_task(monkeypatch: pytest.MonkeyPatch, temporary: Path) 
     def no_room(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(client, "write_task", no_room)
+    monkeypatch.setattr(exchange, "write_task", no_room)
     said = str(failure())
     assert f"temporary files in {temporary}: No space left on device; make room on that disk" in said
     assert list(temporary.iterdir()) == []
@@ -320,7 +320,7 @@ def test_no_folder_for_temporary_files(monkeypatch: pytest.MonkeyPatch, tmp_path
 
 
 def test_no_interpreter(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> None:
-    monkeypatch.setattr(client, "interpreter", lambda: None)
+    monkeypatch.setattr(child, "interpreter", lambda: None)
     assert "No Python interpreter was found" in str(failure())
     assert list(temporary.iterdir()) == []
 
@@ -329,7 +329,7 @@ def test_an_interrupt_while_it_starts(monkeypatch: pytest.MonkeyPatch, temporary
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(client, "write_task", interrupted)
+    monkeypatch.setattr(exchange, "write_task", interrupted)
     with pytest.raises(KeyboardInterrupt):
         client.run(small_task())
     assert list(temporary.iterdir()) == []

@@ -140,7 +140,7 @@ def test_each_task_has_its_time(stand_in: Path, temporary: Path) -> None:
 def test_common_arrays_are_written_once(temporary: Path) -> None:
     worker = Worker(run_of(small_task(), small_task("fine")))
     folder = next(temporary.iterdir())
-    with np.load(folder / "task1" / "pair0.npz") as stored:
+    with np.load(folder / "job" / "task1" / "pair0.npz") as stored:
         assert stored.files == ["key1", "edges"] or stored.files == ["key1"]
     worker.close()
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...solver.frames.many import Run
     from ...solver.frames.task import Outcome, Task
     from ...worker.client import Limits
+    from ...worker.standby import Standby
 
 
 class Job:
@@ -36,7 +37,7 @@ class Job:
         self.label = label
         self.is_cancelled = False
         self._started = clock.monotonic()
-        self._worker: Worker[Any] = Worker(task, limits)
+        self._worker: Worker[Any] = Worker(task, limits, standby())
         self._at_end = ExitStack()
 
     @property
@@ -74,6 +75,23 @@ class Job:
 
 
 _current: Job | None = None
+_standby: Standby | None = None
+
+
+def standby() -> Standby:
+    """Where the child process waits between jobs."""
+    global _standby
+    if _standby is None:
+        from ...worker.standby import Standby
+
+        _standby = Standby()
+    return _standby
+
+
+def prepare() -> None:
+    """Start the child process, if none is there, while Blender gets the job ready for it."""
+    if _current is None:
+        standby().prepare()
 
 
 def current() -> Job | None:
@@ -131,6 +149,10 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Stop the job."""
+    """Stop the job, and end the child process that waits for the next one."""
+    global _standby
     compat.remove_handler(bpy.app.handlers.load_pre, _on_load)
     cancel()
+    if _standby is not None:
+        _standby.close()
+        _standby = None

@@ -17,7 +17,7 @@ from ..kinds import present
 from .common import OperatorMixin, Status, report_error
 
 if TYPE_CHECKING:
-    from ...worker.client import Job
+    from ...worker.exchange import Job
 
     class HasTask(Protocol):
         """What an operator plans."""
@@ -67,6 +67,7 @@ class ChildWork(Typed[Planned, Made]):
         return []
 
     def execute(self, context: bpy.types.Context) -> Status:
+        jobs.prepare()
         from ...worker import client
 
         manager = present(context.window_manager)
@@ -82,6 +83,7 @@ class ChildWork(Typed[Planned, Made]):
                         plan.task,
                         lambda reached: manager.progress_update(reached.overall),
                         preferences.limits(context),
+                        jobs.standby(),
                     )
             finally:
                 manager.progress_end()
@@ -96,6 +98,7 @@ class ChildWork(Typed[Planned, Made]):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
         if bpy.app.background or context.window is None:
             return self.execute(context)
+        jobs.prepare()
         return self._guarded(context, lambda: self._begin(context, self.plan(context)))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:

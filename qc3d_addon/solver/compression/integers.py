@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import lzma
 import zlib
 from collections.abc import Callable
 
@@ -18,18 +19,22 @@ from .prediction import Predictor
 _AT_ONCE = 1 << 20
 # Orders of the differences along the row: none, one for what stays, two for what moves on steadily.
 _ORDERS = 3
+_DICTIONARY = 1 << 22  # bytes; what reading takes is little more
+
+Encode = Callable[[NDArray[np.int64]], bytes]
 
 
-def packed(rows: NDArray[np.int64], predictor: Predictor | None = None) -> bytes:
+def packed(rows: NDArray[np.int64], predictor: Predictor | None = None, encode: Encode = encoded) -> bytes:
     """Rows (F, n, c) as bytes: differences along the row, of whichever order makes them smallest.
 
-    Where the n numbers belong to points a predictor takes away what neighbors tell.
+    Where the n numbers belong to points a predictor takes away what neighbors tell. ``encode`` makes bytes of what is
+    left.
     """
     choices = [_differences(rows, order) for order in range(max(min(_ORDERS, len(rows)), 1))]
     order, left = min(enumerate(choices), key=lambda choice: float(np.log2(1 + np.abs(choice[1])).sum()))
     if predictor is not None:
         left = _together(predictor.differences, left)
-    return bytes([order]) + encoded(left.transpose(0, 2, 1))
+    return bytes([order]) + encode(left.transpose(0, 2, 1))
 
 
 def unpacked(
@@ -78,6 +83,36 @@ def planes(numbers: NDArray[np.int64]) -> bytes:
     table = folded.view(np.uint8).reshape(-1, 8)
     used = int(np.flatnonzero(table.any(axis=0)).max(initial=-1)) + 1
     return np.ascontiguousarray(table[:, :used].T).tobytes()
+
+
+def planes_shortened(numbers: NDArray[np.int64]) -> bytes:
+    """The ``planes`` of numbers by lzma: of large numbers about as few bytes as ``encoded``, in a tenth of the time."""
+    return lzma.compress(planes(numbers), lzma.FORMAT_RAW, filters=_filters())
+
+
+def planes_read(data: bytes, count: int) -> NDArray[np.int64]:
+    """The ``count`` numbers that ``planes_shortened`` made data of, as often as it takes; never more than these need.
+
+    Raises
+    ------
+    InputError
+        If the data is damaged, or does not hold exactly as many.
+    """
+    try:
+        content = lzma.LZMADecompressor(lzma.FORMAT_RAW, filters=_filters()).decompress(data, 8 * count + 1)
+    except (lzma.LZMAError, EOFError) as error:
+        raise InputError("The numbers cannot be decoded; the file is damaged.") from error
+    used, left = divmod(len(content), max(count, 1))
+    if left or used > 8:
+        raise InputError("The numbers are not as many as they should be; the file is damaged.")
+    table = np.zeros((count, 8), dtype=np.uint8)
+    table[:, :used] = np.frombuffer(content, dtype=np.uint8).reshape(used, count).T
+    folded = table.view("<u8").ravel().astype(np.uint64)
+    return np.asarray((folded >> np.uint64(1)).astype(np.int64) ^ -(folded & np.uint64(1)).astype(np.int64))
+
+
+def _filters() -> list[dict[str, int]]:
+    return [{"id": lzma.FILTER_LZMA1, "preset": 9, "dict_size": _DICTIONARY, "lc": 0, "lp": 0, "pb": 0}]
 
 
 def inflated(data: bytes, size: int) -> bytes:

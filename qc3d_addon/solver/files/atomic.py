@@ -7,7 +7,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -16,6 +16,9 @@ from .private_folders import PrivateFolder
 from .replacement import NO_FILE, alone_in, inherit, put_back, require_replaceable, set_aside
 
 _LONGEST_SUFFIX = 50  # characters; no format has a longer suffix
+
+BeforeReplacing = Callable[[dict[Path, Path]], None]
+_before_replacing: BeforeReplacing | None = None
 
 
 def require_writable(*paths: Path, inputs: Iterable[Path | None] = ()) -> None:
@@ -105,6 +108,8 @@ def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
             with _as_input_error(path, _UNWRITTEN):
                 _require_whole(path, file, folder)
         with alone_in({target.parent for target in targets}), ExitStack() as undo:
+            if _before_replacing is not None:
+                _before_replacing(dict(zip(targets, new, strict=True)))
             for path, target, file, folder in zip(paths, targets, new, folders, strict=True):
                 with _as_input_error(path, _UNWRITTEN):
                     require_replaceable(path, target)
@@ -113,6 +118,20 @@ def replacing_all(*paths: Path, beside: bool = False) -> Iterator[list[Path]]:
                         undo.callback(put_back, target, set_aside(target, folder), file.lstat())
                     file.replace(target)
             undo.pop_all()
+
+
+@contextmanager
+def before_replacing(call: BeforeReplacing) -> Iterator[None]:
+    """Context manager that has ``call`` called when files are complete, before they take their places.
+
+    It gets the complete file of each final path, and may write down what they are. If it raises, nothing is replaced.
+    """
+    global _before_replacing
+    earlier, _before_replacing = _before_replacing, call
+    try:
+        yield
+    finally:
+        _before_replacing = earlier
 
 
 @contextmanager
@@ -160,6 +179,17 @@ def require_room(path: Path, size: int) -> None:
         os.fsync(file.fileno())
 
 
+def identities(path: Path) -> list[object]:
+    """What two names of the same file have in common: the resolved path, and the device and inode numbers."""
+    found: list[object] = []
+    with suppress(OSError, ValueError):  # reported when it is read or written
+        found.append(os.path.normcase(os.path.realpath(path)))
+        status = path.stat()
+        if status.st_ino:  # some file systems have no inode numbers
+            found.append((status.st_dev, status.st_ino))
+    return found
+
+
 _UNWRITTEN = "cannot be written"
 _NO_FOLDER = "cannot be made a folder"
 
@@ -174,7 +204,7 @@ def _as_input_error(what: Path | str, problem: str) -> Iterator[None]:
 
 def _targets(paths: Sequence[Path], inputs: Sequence[Path]) -> list[Path]:
     """The output files with links resolved; InputError if one is not an ordinary file or is named twice."""
-    seen: dict[object, int] = {key: -1 for path in inputs for key in _identities(path)}
+    seen: dict[object, int] = {key: -1 for path in inputs for key in identities(path)}
     targets = []
     for number, path in enumerate(paths):
         try:
@@ -187,20 +217,9 @@ def _targets(paths: Sequence[Path], inputs: Sequence[Path]) -> list[Path]:
             raise InputError(f"{path} is a folder; give the name of a file.")
         if not stat.S_ISREG(mode):
             raise InputError(NO_FILE.format(path))
-        if any(seen.setdefault(key, number) != number for key in _identities(path)):
+        if any(seen.setdefault(key, number) != number for key in identities(path)):
             raise InputError(f"{path} is named twice; input, output and report must be different files.")
     return targets
-
-
-def _identities(path: Path) -> list[object]:
-    """What two names of the same file have in common: the resolved path, and the device and inode numbers."""
-    found: list[object] = []
-    with suppress(OSError, ValueError):  # reported when it is read or written
-        found.append(os.path.normcase(os.path.realpath(path)))
-        status = path.stat()
-        if status.st_ino:  # some file systems have no inode numbers
-            found.append((status.st_dev, status.st_ino))
-    return found
 
 
 def _is_there(path: Path) -> bool:

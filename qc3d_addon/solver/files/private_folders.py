@@ -19,6 +19,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
 
+from .locks import lock
+
 PREFIX = ".qc3d-"
 _MARK = "in_use"
 _SENTENCE = "QC3D removes this folder, and all that is in it, once the program that made it has ended.\n"
@@ -191,16 +193,6 @@ def _remove(path: Path) -> bool:
 def _lock(file: BinaryIO) -> bool:
     """Lock a file until it is closed; return False if it is locked already, or if the file system has no locks."""
     try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            file.seek(_LONGEST_MARK)  # beyond the end: others cannot read a locked byte
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-            file.seek(0)
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return lock(file, at=_LONGEST_MARK)  # beyond the end: others cannot read a locked byte
     except OSError:
         return False
-    return True

@@ -80,9 +80,15 @@ def follow_path(fitter: FoldFreeFitter, targets: Sequence[Floats]) -> Generator[
     mesh, steps = fitter.mesh, len(targets)
     maps = np.empty((steps + 1, *mesh.points.shape))
     maps[0] = mesh.points
-    turns = np.zeros((len(mesh.tets), 3))
     for step, target in enumerate(targets, start=1):
         maps[step] = fitter.fit(maps[step - 1], target, _LAST_ITERATIONS if step == steps else _STEP_ITERATIONS)
-        turns = nearest_branch(rotation_vectors(polar_decomposition(mesh.jacobians(maps[step])).rotation), turns)
         yield step / steps
-    return FollowedPath(maps, turns)
+    return FollowedPath(maps, turns_along(mesh, maps))
+
+
+def turns_along(mesh: TetMesh, maps: Floats) -> Floats:
+    """(M, 3) rotation vectors of the tetrahedra of the last of the maps (K + 1, N, 3), unwrapped along them."""
+    turns = np.zeros((len(mesh.tets), 3))
+    for values in maps[1:]:
+        turns = nearest_branch(rotation_vectors(polar_decomposition(mesh.jacobians(values)).rotation), turns)
+    return turns

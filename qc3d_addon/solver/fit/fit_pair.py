@@ -21,6 +21,7 @@ from ..triangles.topology import sides
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
+from .lattice import way_on_lattice
 from .meeting import MET, crossing_vertices, meet_keys
 from .volume import Volume, in_single_precision
 
@@ -105,6 +106,7 @@ def _near(
         path, targets = way.result()
     with timed(seconds, "fit"):
         followed = yield from staged("fit", follow_path(fitter, [in_single_precision(target) for target in targets]))
+        followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
     return FittedMap(embedding.pair, volume, *parts)
@@ -121,6 +123,7 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
         path, targets = way.result()
     with timed(seconds, "fit"):
         followed = yield from staged("fit", meet_keys(embedding, volume.mesh, volume.landmarks, targets))
+        followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
     return FittedMap(embedding.pair, volume, *parts)

@@ -7,11 +7,14 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import InputError
 from ..files.npz import Archive
 from ..keys.embedding import Cube
@@ -19,12 +22,15 @@ from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
 from ..settings import FitOptions
 from ..tets.mesh import TetMesh
+from .continuation import turns_along
 from .fitted_map import FittedMap
+from .kept_arrays import arrays_of, mesh_and_maps
 
-FORMAT_VERSION = 4  # up to 3, every pair had a cube of its own
-_OLDEST = 3
+FORMAT_VERSION = 5  # up to 4, all arrays were stored as they are; up to 3, every pair had a cube of its own
+_OLDEST, _LAST_PLAIN = 3, 4
 _SEAL_LENGTH = 32
 _NOT_ORTHONORMAL = 1e-9
+_ARRAYS = ("header", "points", "maps", "turns", "tets")
 _CUBE = ("axes", "center", "scale")
 _DAMAGED = "The stored map is damaged; fit the keys again."
 _UNREADABLE = (ValueError, KeyError, TypeError, OverflowError, RecursionError, MemoryError)
@@ -49,24 +55,22 @@ def _seal(content: bytes) -> bytes:
 
 
 def to_bytes(fitted: FittedMap) -> bytes:
-    """Store a fitted map, preceded by a checksum. Of the keys only the hash is stored."""
-    cube = fitted.volume.cube
+    """Store a fitted map without loss, preceded by a checksum. Of the keys only the hash is stored."""
+    cube, mesh = fitted.volume.cube, fitted.mesh
     header = {
         "version": FORMAT_VERSION,
         "fingerprint": fingerprint(fitted.pair),
         "options": asdict(fitted.options),
         "engine": fitted.engine,
         "notes": list(fitted.notes),
+        "counts": [len(mesh.points), len(mesh.tets), len(fitted.maps)],
         "cube": None if cube is None else {name: np.asarray(getattr(cube, name)).tolist() for name in _CUBE},
     }
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
         header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
-        points=fitted.mesh.points,
-        tets=fitted.mesh.tets.astype(np.int32),
-        maps=fitted.maps,
-        turns=fitted.turns,
+        **arrays_of(mesh, fitted.maps, fitted.turns),
     )
     return _seal(buffer.getvalue()) + buffer.getvalue()
 
@@ -111,22 +115,22 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
     if not _is_whole(data):
         raise InputError(_DAMAGED)
     try:
-        stored = _opened(data).read(("header", "points", "maps", "turns", "tets"))
-    except InputError as error:
-        raise InputError(_DAMAGED) from error
-    try:
+        archive = _opened(data)
+        stored = archive.read(name for name in _ARRAYS if name in archive)
         header = json.loads(bytes(stored["header"]))
         version, owner = header["version"], header["fingerprint"]
-        if version not in range(_OLDEST, FORMAT_VERSION + 1):
-            raise InputError(
-                f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
-            )
+    except (InputError, *_UNREADABLE) as error:
+        raise InputError(_DAMAGED) from error
+    if version not in range(_OLDEST, FORMAT_VERSION + 1):
+        raise InputError(
+            f"The stored map has format {version!r}, this version reads {FORMAT_VERSION}; fit the keys again."
+        )
+    try:
         options, engine = FitOptions(**header["options"]), str(header["engine"])
         notes = tuple(str(note) for note in header["notes"])
         cube = _cube(header.get("cube"))
-        points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
-        tets = np.asarray(stored["tets"], dtype=np.int64)
-    except _UNREADABLE as error:
+        points, tets, maps, turns = (_plain_arrays if version <= _LAST_PLAIN else _arrays)(stored, header)
+    except (InputError, *_UNREADABLE) as error:
         raise InputError(_DAMAGED) from error
     if owner != fingerprint(pair):
         raise InputError("The stored map belongs to other keys or another mesh; fit the keys again.")
@@ -134,16 +138,33 @@ def from_bytes(data: bytes, pair: KeyPair) -> FittedMap:
         raise InputError(_DAMAGED)
     if tets.ndim != 2 or tets.shape[1] != 4 or not len(tets) or tets.min() < 0 or tets.max() >= len(points):
         raise InputError(_DAMAGED)
-    if turns.shape != (len(tets), 3) or not all(np.isfinite(numbers).all() for numbers in (points, maps, turns)):
+    if not np.isfinite(points).all() or not np.isfinite(maps).all():
         raise InputError(_DAMAGED)
     mesh = TetMesh(points, tets)
     # Jacobians exist only if no volume is zero.
     if not mesh.volumes.min() > 0.0 or not all(determinants(mesh.jacobians(values)).min() > 0.0 for values in maps):
         raise InputError(_DAMAGED)
+    if turns is None:
+        turns = turns_along(mesh, maps)
+    elif turns.shape != (len(tets), 3) or not np.isfinite(turns).all():
+        raise InputError(_DAMAGED)
     fitted = FittedMap.restored(pair, mesh, maps, turns, options, engine, notes, cube)
     if cube is not None and not cube.holds(fitted.embedding):
         raise InputError(_DAMAGED)
     return fitted
+
+
+def _arrays(stored: Mapping[str, NDArray[Any]], header: dict[str, Any]) -> tuple[Floats, Ints, Floats, Floats | None]:
+    """Points, tetrahedra, maps, and turns where they do not follow from the maps; raises as what reads damaged data."""
+    points, tets, maps = (int(count) for count in header["counts"])
+    mesh, values = mesh_and_maps(stored, (points, tets, maps))
+    return mesh.points, mesh.tets, values, np.asarray(stored["turns"], np.float64) if "turns" in stored else None
+
+
+def _plain_arrays(stored: Mapping[str, NDArray[Any]], header: dict[str, Any]) -> tuple[Floats, Ints, Floats, Floats]:
+    """The same from earlier versions."""
+    points, maps, turns = (np.asarray(stored[name], dtype=np.float64) for name in ("points", "maps", "turns"))
+    return points, np.asarray(stored["tets"], dtype=np.int64), maps, turns
 
 
 def _cube(values: dict[str, Any] | None) -> Cube | None:

@@ -19,6 +19,7 @@ from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
 from ..triangles.winding_number import insideness, winding_numbers
 from .fold_free import FoldFreeFitter
+from .lattice import mesh_on_lattice
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class Volume:
         key0, faces = embedding.key0, embedding.pair.faces
         points = key0 if options.quality == "exact" else in_single_precision(key0)
         made = fill_cube(points, faces, options, stretches, 1.0 if cube is None else 1.0 / ROOM)
-        return cls(made.mesh, made.engine, key0, faces, embedding.weights, made.notes, cube)
+        return cls(mesh_on_lattice(made.mesh), made.engine, key0, faces, embedding.weights, made.notes, cube)
 
     @cached_property
     def landmarks(self) -> csr_array:

@@ -20,7 +20,7 @@ from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import Ends, KeyPair, require_sizes
 from ..settings import FitOptions
-from ..support.memory import give_back
+from ..support.memory import announce, give_back
 from ..support.progress import Done
 from ..support.threads import alone, thread_count
 from .task import Outcome, Task, carry_out
@@ -134,10 +134,18 @@ class Run:
         """Number of tasks that run at once: small meshes keep only one core busy each."""
         vertices = max((len(pair.key0) for task in self.tasks for pair in task.pairs.values()), default=0)
         most = 1 if vertices > _SMALL else max(1, min(thread_count(), len(self.tasks)))
-        needed = max((task.estimated_mb for task in self.tasks), default=0.0)
-        while most > 1 and self.memory_mb and needed * (1.0 + _MORE_OF_EACH * (most - 1)) > self.memory_mb:
+        while most > 1 and self.memory_mb and self._estimated_mb(most) > self.memory_mb:
             most -= 1
         return most
+
+    @property
+    def estimated_mb(self) -> float:
+        """Estimated peak memory of the run, in megabytes."""
+        return self._estimated_mb(self.at_once)
+
+    def _estimated_mb(self, at_once: int) -> float:
+        needed = max((task.estimated_mb for task in self.tasks), default=0.0)
+        return needed * (1.0 + _MORE_OF_EACH * (at_once - 1))
 
     def carried_out(self, failures: tuple[type[Exception], ...] = (QC3DError,)) -> Generator[Done | Ended, None, None]:
         """Carry out the tasks; yield how far they are, and each outcome as soon as it is there.
@@ -175,6 +183,7 @@ class Run:
     def outcomes(self, on_progress: Callable[[Done], object] | None = None) -> list[Outcome | QC3DError]:
         """Carry out the tasks; the outcome of each, in their order, or why there is none."""
         found: dict[int, Outcome | QC3DError] = {}
+        announce(self.estimated_mb)
         for step in self.carried_out():
             if isinstance(step, Done):
                 if on_progress is not None:

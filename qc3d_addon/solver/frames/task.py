@@ -17,6 +17,7 @@ from ..collision.colliders import Collider
 from ..errors import naming_pair
 from ..fit.fit_pair import fit_pair
 from ..fit.fitted_map import FittedMap
+from ..fit.recent import RecentFits
 from ..fit.storage import from_bytes, to_bytes
 from ..fit.volume import Volume
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
@@ -126,9 +127,9 @@ class Task:
         if limit_mb:
             require_memory(self.estimated_mb, limit_mb, len(next(iter(self.pairs.values())).key0))
 
-    def carried_out(self) -> Steps[Outcome]:
+    def carried_out(self, recent: RecentFits | None = None) -> Steps[Outcome]:
         """See ``carry_out``."""
-        return carry_out(self)
+        return carry_out(self, recent=recent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +148,11 @@ class Outcome:
     bake: Bake | None
 
 
-def carry_out(task: Task, shared: Callable[[KeyPair], Volume | None] = lambda pair: None) -> Steps[Outcome]:
+def carry_out(
+    task: Task,
+    shared: Callable[[KeyPair], Volume | None] = lambda pair: None,
+    recent: RecentFits | None = None,
+) -> Steps[Outcome]:
     """Compute the missing fits, then the frames. All bakes go this way.
 
     Parameters
@@ -155,6 +160,8 @@ def carry_out(task: Task, shared: Callable[[KeyPair], Volume | None] = lambda pa
     task : Task
     shared : callable
         Returns the volume around the first key of a pair, if other tasks made it already.
+    recent : RecentFits, optional
+        Where maps are looked for, and remembered for the next task.
 
     Raises
     ------
@@ -176,8 +183,10 @@ def carry_out(task: Task, shared: Callable[[KeyPair], Volume | None] = lambda pa
             if data is None:
                 fits[ends] = yield from numbered(fit_pair(pair, task.fit_options, shared(pair)), made, every)
                 data, made = to_bytes(fits[ends]), made + 1
+                if recent is not None:
+                    recent.keep(data, fits[ends])
             else:
-                fits[ends] = from_bytes(data, pair)
+                fits[ends] = from_bytes(data, pair) if recent is None else recent.restored(data, pair)
             stored[ends] = data
     if not len(times):
         return Outcome(stored, None)

@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import os
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ..errors import InputError
@@ -25,6 +26,9 @@ _BYTES_OF_FACTORS = 600.0  # for each vertex to the power 4/3, as for the factor
 _KB_OF_MATRICES, _BLOCKS = 1.0, 6  # for each vertex; blocks of vectors and directions that are held at once
 _KB_OF_NEIGHBORS, _VECTORS_PER_MODE = 1.0, 5  # for each vertex; of all three coordinates, and while they are computed
 _SHARE_OF_MACHINE = 0.75  # leaves a quarter for Blender and the system
+
+_own_limit_mb = 0
+_hears_needs: Callable[[float], None] | None = None
 
 
 def estimated_mb(
@@ -69,6 +73,33 @@ def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:
             f"{limit_mb:.0f} MB. Raise the limit, use fewer in-betweens or keys, or bake a coarser mesh and transfer "
             "the in-betweens with a Surface Deform modifier."
         )
+    announce(needed_mb)
+
+
+@contextlib.contextmanager
+def shared_memory(limit_mb: int, hears_needs: Callable[[float], None]) -> Iterator[None]:
+    """Context manager for a process that shares the machine's memory with others of its kind.
+
+    Parameters
+    ----------
+    limit_mb : int
+        Megabytes that all of them may use together, in place of three quarters of the machine's; 0 leaves these.
+    hears_needs : callable
+        Called with the estimated megabytes of each work before it begins; it may wait until there is room.
+    """
+    global _own_limit_mb, _hears_needs
+    before = _own_limit_mb, _hears_needs
+    _own_limit_mb, _hears_needs = limit_mb, hears_needs
+    try:
+        yield
+    finally:
+        _own_limit_mb, _hears_needs = before
+
+
+def announce(needed_mb: float) -> None:
+    """Say that work begins that needs so many megabytes; waits where ``shared_memory`` says so."""
+    if _hears_needs is not None:
+        _hears_needs(needed_mb)
 
 
 def require_memory_for_tets(points: int, tets: int, held: int) -> None:
@@ -148,7 +179,12 @@ def _require(needed_mb: float, what: str, remedy: str) -> None:
 
 
 def machine_limit_mb() -> int:
-    """Default memory limit of a bake in megabytes: three quarters of the machine's memory, or 0 if that is unknown."""
+    """Default memory limit of a bake in megabytes: three quarters of the machine's memory, or 0 if that is unknown.
+
+    Within ``shared_memory``, its limit.
+    """
+    if _own_limit_mb:
+        return _own_limit_mb
     try:
         total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):  # this system does not tell
@@ -165,8 +201,25 @@ def give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
+_forgotten = 0.0  # a peak before the present work, where the system goes on telling it
+
+
+def forget_peak() -> None:
+    """Let ``peak_memory_mb`` tell the peak from now on, in a process that does one piece of work after the other."""
+    global _forgotten
+    try:
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # Linux
+    except OSError:
+        _forgotten = peak_memory_mb() or _forgotten
+
+
 def peak_memory_mb() -> float | None:
-    """Peak resident memory of this process in megabytes; None on Windows, which does not tell."""
+    """Peak resident memory of this process in megabytes; None where the system does not tell, as on Windows."""
+    found = _told_peak_mb()
+    return found if found is None or found > _forgotten else None
+
+
+def _told_peak_mb() -> float | None:
     try:  # Linux counts in ``ru_maxrss`` what the process was forked from, such as a large Blender
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
         return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 2**10

@@ -18,18 +18,29 @@ Result = TypeVar("Result")
 
 # Beyond four threads, the GIL and the memory bandwidth leave nothing to gain.
 _MOST_THREADS = 4
+_most_threads = _MOST_THREADS
 _this_thread = threading.local()
 
 
 def thread_count() -> int:
     """Number of pieces of work that run at once: the cores available to this process, at most four.
 
-    It is 1 in a thread that is ``alone``.
+    It is 1 in a thread that is ``alone``, and may be fewer after ``use_at_most``.
     """
     if getattr(_this_thread, "is_alone", False):
         return 1
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(cores, _MOST_THREADS)
+    return min(cores(), _most_threads)
+
+
+def cores() -> int:
+    """Number of cores available to this process."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def use_at_most(threads: int) -> None:
+    """Let this process work with at most so many threads, because other processes use the other cores."""
+    global _most_threads
+    _most_threads = max(1, min(threads, _MOST_THREADS))
 
 
 @contextmanager

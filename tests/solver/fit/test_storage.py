@@ -18,12 +18,16 @@ from hypothesis import strategies as st
 from numpy.lib import format as npy
 
 from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.fit.continuation import FollowedPath, turns_along
 from qc3d_addon.solver.fit.fitted_map import FittedMap
+from qc3d_addon.solver.fit.lattice import mesh_on_lattice, way_on_lattice
 from qc3d_addon.solver.fit.storage import FORMAT_VERSION, fingerprint, from_bytes, to_bytes, why_unusable
 from qc3d_addon.solver.keys.keypair import KeyPair
+from qc3d_addon.solver.meshing.slivers import triangulate
 from qc3d_addon.solver.settings import FitOptions
+from qc3d_addon.solver.tets.mesh import TetMesh
 
-from ..meshes import icosphere, jittered_grid, sine_map
+from ..meshes import icosphere, jittered_grid, random_delaunay, sine_map
 
 POINTS, FACES = icosphere(0)
 PAIR = KeyPair.checked(POINTS, 1.1 * POINTS, FACES, [[0, 5]])
@@ -38,6 +42,15 @@ def fitted() -> FittedMap:
     return FittedMap.restored(PAIR, mesh, maps, turns, options, "delaunay", ("Ein Satz für dich – „so“.", "Two."))
 
 
+def on_lattice(mesh: TetMesh, size: float = 0.05) -> FittedMap:
+    """The same as the fit makes it: on a lattice, with turns that follow from the maps."""
+    mesh = mesh_on_lattice(mesh)
+    full = sine_map(mesh.points, np.full((1, 3), size), np.ones((1, 3, 3)))
+    maps = mesh.points + np.linspace(0.0, 1.0, 4)[:, None, None] * (full - mesh.points)
+    followed = way_on_lattice(mesh, FollowedPath(maps, turns_along(mesh, maps)))
+    return FittedMap.restored(PAIR, mesh, followed.maps, followed.turns, FitOptions(), "delaunay")
+
+
 STORED = to_bytes(fitted())
 SEAL = hashlib.sha256().digest_size
 
@@ -47,6 +60,15 @@ def contents(data: bytes) -> dict[str, Any]:
         found: dict[str, Any] = dict(stored)
     found["header"] = json.loads(bytes(found["header"]))
     return found
+
+
+def plain() -> dict[str, Any]:
+    """What version 4 stored."""
+    whole, found = fitted(), contents(STORED)
+    found["header"]["version"] = 4
+    del found["header"]["counts"]
+    arrays = {"points": whole.mesh.points, "tets": whole.mesh.tets.astype(np.int32), "maps": whole.maps}
+    return {"header": found["header"], **arrays, "turns": whole.turns}
 
 
 def sealed(found: dict[str, Any]) -> bytes:
@@ -85,6 +107,27 @@ class TestRoundTrip:
 
     def test_again_and_again(self) -> None:
         assert_identical(from_bytes(to_bytes(from_bytes(STORED, PAIR)), PAIR), fitted())
+
+    def test_of_earlier_versions(self) -> None:
+        assert_identical(from_bytes(sealed(plain()), PAIR), fitted())
+
+    @settings(max_examples=20, deadline=None)
+    @given(st.integers(0, 60), st.integers(0, 10**6))
+    def test_on_a_lattice(self, count: int, seed: int) -> None:
+        whole = on_lattice(random_delaunay(count, seed), 0.01)
+        assert_identical(from_bytes(to_bytes(whole), PAIR), whole)
+
+    def test_what_follows_from_the_rest_is_not_stored(self) -> None:
+        points = np.round(random_delaunay(100, 1).points * 2.0**20) / 2.0**20
+        delaunay = on_lattice(TetMesh(points, triangulate(points)), 0.01)
+        data = to_bytes(delaunay)
+        assert set(contents(data)) == {"header", "points", "maps"}
+        assert_identical(from_bytes(data, PAIR), delaunay)
+        other = FittedMap.restored(
+            PAIR, delaunay.mesh, delaunay.maps, delaunay.turns + 2.0 * np.pi, FitOptions(), "delaunay"
+        )
+        assert set(contents(to_bytes(other))) == {"header", "points", "maps", "turns"}
+        assert_identical(from_bytes(to_bytes(other), PAIR), other)
 
     def test_the_keys_are_not_stored(self) -> None:
         for array in (PAIR.key0, PAIR.key1):
@@ -158,7 +201,7 @@ class TestWrongContents:
 
     @staticmethod
     def refused(words: str, **changes: Any) -> None:  # noqa: ANN401
-        found = contents(STORED)
+        found = plain()
         for name, value in changes.items():
             if value is None:
                 del found[name]
@@ -170,16 +213,23 @@ class TestWrongContents:
     def test_nothing_changed(self) -> None:
         assert_identical(from_bytes(sealed(contents(STORED)), PAIR), fitted())
 
+    def test_a_lattice_that_is_none(self) -> None:
+        found = contents(STORED)
+        found["points"] = np.concatenate([[np.uint8(21)], found["points"][1:]])
+        with pytest.raises(InputError, match="damaged"):
+            from_bytes(sealed(found), PAIR)
+
     def test_another_version(self) -> None:
         header = {**contents(STORED)["header"], "version": 99}
-        self.refused("has format 99, this version reads 4; fit the keys", header=header)
+        self.refused("has format 99, this version reads 5; fit the keys", header=header)
 
     @pytest.mark.parametrize(
         ("version", "said"),
         [
             (FORMAT_VERSION, None),
             (FORMAT_VERSION - 1, None),
-            (FORMAT_VERSION - 2, "was made by an earlier version of QC3D"),
+            (FORMAT_VERSION - 2, None),
+            (FORMAT_VERSION - 3, "was made by an earlier version of QC3D"),
             (FORMAT_VERSION + 1, "was made by a later version of QC3D"),
             ("1", "is damaged"),
             (None, "is damaged"),
@@ -206,7 +256,7 @@ class TestWrongContents:
 
     @pytest.mark.parametrize("name", ["version", "fingerprint", "engine", "notes", "options"])
     def test_a_part_of_the_header_is_missing(self, name: str) -> None:
-        header = contents(STORED)["header"]
+        header = plain()["header"]
         del header[name]
         self.refused("damaged", header=header)
 
@@ -218,8 +268,25 @@ class TestWrongContents:
     def test_objects_are_not_unpickled(self) -> None:
         self.refused("damaged", points=np.array([print, None], dtype=object))
 
-    def test_arrays_that_do_not_fit_together(self) -> None:
+    @pytest.mark.parametrize(
+        "counts", [[0, 1, 2], [27, 0, 3], [27, 162, 1], [2**40, 162, 3], [26, 162, 3], [27, 1, 3], "x", None]
+    )
+    def test_counts(self, counts: object) -> None:
         found = contents(STORED)
+        found["header"]["counts"] = counts
+        with pytest.raises(InputError, match="damaged"):
+            from_bytes(sealed(found), PAIR)
+
+    @pytest.mark.parametrize("name", ["points", "maps", "tets"])
+    def test_arrays_of_this_version(self, name: str) -> None:
+        whole = contents(STORED)[name]
+        changes = (whole[: len(whole) // 2], whole.astype(np.int32), whole[None], whole[:0])
+        for other in (*changes, np.full(40, 255, dtype=np.uint8)):
+            with pytest.raises(InputError, match="damaged"):
+                from_bytes(sealed({**contents(STORED), name: other}), PAIR)
+
+    def test_arrays_that_do_not_fit_together(self) -> None:
+        found = plain()
         self.refused("damaged", points=found["points"][:, :2])
         self.refused("damaged", points=found["points"][:-1])
         self.refused("damaged", maps=found["maps"][:1])
@@ -234,12 +301,12 @@ class TestWrongContents:
     @pytest.mark.parametrize("name", ["points", "maps", "turns"])
     @pytest.mark.parametrize("number", [np.nan, np.inf])
     def test_numbers_that_are_none(self, name: str, number: float) -> None:
-        array = contents(STORED)[name].copy()
+        array = plain()[name].copy()
         array.flat[20] = number
         self.refused("damaged", **{name: array})
 
     def test_folds(self) -> None:
-        found = contents(STORED)
+        found = plain()
         self.refused("damaged", tets=found["tets"][:, [1, 0, 2, 3]])
         self.refused("damaged", maps=found["maps"] * [1.0, 1.0, -1.0])
         self.refused("damaged", maps=found["maps"] * [1.0, 1.0, 0.0])

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 QC3D authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The order in which jobs run, and how each one ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import suppress
+
+from ...solver.errors import InputError
+from .jobs import Job
+from .orders import Ended, Order
+from .pools import Pool, lost
+from .records import State
+
+_TURN_SECONDS = 1.0  # some systems see Ctrl-C only between two waits
+
+
+class Schedule:
+    """Jobs of a batch on their way.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        Those to do; a job that reads the result of another one begins when that has ended.
+    state : State
+        Tells what is done already.
+    pool : Pool
+    order : callable
+        Returns the order for a job.
+    on_end : callable
+        Called with each job and how it ended.
+    """
+
+    def __init__(
+        self,
+        jobs: Sequence[Job],
+        state: State,
+        pool: Pool,
+        order: Callable[[Job], Order],
+        on_end: Callable[[Job, Ended], object],
+    ) -> None:
+        self.ended: dict[int, Ended] = {}
+        self._jobs = jobs
+        self._state = state
+        self._pool = pool
+        self._order = order
+        self._on_end = on_end
+        self._running: dict[Future[Ended], Job] = {}
+
+    def run(self) -> None:
+        """Carry out all jobs; a KeyboardInterrupt leaves those that have not ended to ``stop``."""
+        numbers = {job.number for job in self._jobs}
+        for job in self._jobs:
+            if job.after not in numbers:
+                self._begin(job)
+        while self._running:
+            done, _ = wait(self._running, _TURN_SECONDS, FIRST_COMPLETED)
+            for future in done:
+                self._end(self._running.pop(future), _result(future))
+            if not done and not self._pool.is_there():
+                gone = list(self._running.values())
+                self._running.clear()
+                for job in gone:
+                    self._end(job, Ended.failed(lost(ConnectionError("the scheduler is gone"))))
+
+    def stop(self, batch: str) -> None:
+        """End the jobs that run; those that have ended meanwhile count as that."""
+        self._pool.stop(batch)
+        for future, job in self._running.items():
+            if future.done() and not future.cancelled():
+                with suppress(Exception):  # it was stopped
+                    self._end(job, future.result(), goes_on=False)
+        for job in self._jobs:
+            if job.number not in self.ended:
+                self._end(job, Ended("stopped"), goes_on=False)
+
+    def _begin(self, job: Job) -> None:
+        known = self._state.record(job)
+        if known is None:
+            self._running[self._pool.submit(self._order(job))] = job
+        else:
+            self._end(job, Ended("resumed", None, known.seconds, known.peak_memory_mb))
+
+    def _end(self, job: Job, ended: Ended, goes_on: bool = True) -> None:
+        self.ended[job.number] = ended
+        self._on_end(job, ended)
+        for following in self._following(job) if goes_on else ():
+            if ended.how in ("done", "resumed"):
+                self._begin(following)
+            else:
+                self._end(
+                    following,
+                    Ended.failed(InputError(f"Its file is made by {job.name!r}, which failed; see there.")),
+                )
+
+    def _following(self, job: Job) -> Iterator[Job]:
+        return (other for other in self._jobs if other.after == job.number)
+
+
+def _result(future: Future[Ended]) -> Ended:
+    try:
+        return future.result()
+    except Exception as error:  # whatever a cluster raises when it gives a job up
+        return Ended.failed(lost(error))

@@ -230,7 +230,8 @@ class SurfacePath:
             for shape, other in zip(costly, free, strict=True):
                 settled[shape] = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
         settled = [
-            self._lengths_first.straightened(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)
+            self._lengths_first.straightened(shape, time, self._embedding.straight(time)[self.vertices])
+            for shape, (time, _) in zip(settled, moments, strict=True)
         ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
@@ -110,6 +111,22 @@ class TriangleTree:
             self._apart.insert(0, self._wanted(_without(_children(above, count), touching, count), 1))
             touching = above
 
+    def among(self, moving: Bools) -> TriangleTree:
+        """The same tree for searches of fewer pairs: those with at least one of the triangles ``moving`` (m,)."""
+        fewer = copy.copy(self)
+        fewer._moves = [moving[self.order]]
+        for _ in self._apart:
+            fewer._moves.insert(0, _joined(fewer._moves[0], np.logical_or, False))
+        fewer._apart = [fewer._wanted(pairs, level) for level, pairs in enumerate(self._apart, start=1)]
+        return fewer
+
+    def within(self, low: Floats, high: Floats) -> TriangleTree:
+        """The same tree, faster, for shapes whose leaves' boxes lie in the boxes with the corners (3, m)."""
+        faster = copy.copy(self)
+        boxes = self._boxes(low, high)[1:]
+        faster._apart = [_meeting(pairs, *level) for pairs, level in zip(self._apart, boxes, strict=True)]
+        return faster
+
     def _wanted(self, pairs: Pairs, level: int) -> Pairs:
         """The pairs of nodes of a level that have moving triangles below them and are not in one group."""
         pairs = _concerned(pairs, self._moves[level])
@@ -134,12 +151,16 @@ class TriangleTree:
         CrowdedError
             If the budget is exceeded.
         """
+        nothing = np.empty(0, dtype=np.int64)
+        yield from self._below(0, (nothing, nothing), self._boxes(low, high), budget, True)
+
+    def _boxes(self, low: Floats, high: Floats) -> list[tuple[Floats, Floats]]:
+        """The boxes of the nodes of each level, from the root to the leaves, whose boxes are given."""
         boxes = [(low, high)]
         for _ in self._apart:
             low, high = _joined(low, np.minimum, np.inf), _joined(high, np.maximum, -np.inf)
             boxes.insert(0, (low, high))
-        nothing = np.empty(0, dtype=np.int64)
-        yield from self._below(0, (nothing, nothing), boxes, budget, True)
+        return boxes
 
     def _below(
         self, level: int, pairs: Pairs, boxes: list[tuple[Floats, Floats]], budget: Budget, known: bool

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,9 +44,9 @@ class CrossingSearch:
     def __init__(
         self, faces: Ints, shapes: Sequence[Floats], moving: Bools | None = None, sides: Bools | None = None
     ) -> None:
-        self._count = len(faces)
+        self._given, self._count = faces, len(faces)
         moving = np.ones(self._count, dtype=bool) if moving is None else moving
-        once = _listed_once(faces)
+        self._once = once = _listed_once(faces)
         if once is not None:
             faces, moving, sides = faces[once], moving[once], None if sides is None else sides[once]
         groups = None if sides is None else sides.astype(np.int64)
@@ -55,6 +56,29 @@ class CrossingSearch:
             self._rows = order if once is None else once[order]
             self._faces = faces[order]
             self._corners = np.ascontiguousarray(self._faces.T)
+
+    def is_of(self, faces: Ints) -> bool:
+        """Whether it searches these triangles (m, 3)."""
+        return np.array_equal(self._given, faces)
+
+    def among(self, moving: Bools) -> CrossingSearch:
+        """The same search, made for all triangles, of pairs with at least one of the triangles ``moving`` (m,) only."""
+        fewer = copy.copy(self)
+        chosen = moving if self._once is None else moving[self._once]
+        fewer._tree = None if self._tree is None or not chosen.any() else self._tree.among(chosen)
+        return fewer
+
+    def within(self, low: Floats, high: Floats) -> CrossingSearch:
+        """The same search, faster, in shapes each of whose points lies between the corners (n, 3) of a box of its own.
+
+        Triangles whose boxes never overlap need not be looked at in any of these shapes.
+        """
+        faster = copy.copy(self)
+        if self._tree is not None:
+            lowest = np.min([low.T[:, corner] for corner in self._corners], axis=0)
+            highest = np.max([high.T[:, corner] for corner in self._corners], axis=0)
+            faster._tree = self._tree.within(lowest, highest)
+        return faster
 
     def pairs(self, points: Floats) -> Ints:
         """Pairs of triangles that share no vertex and cross in the shape ``points`` (n, 3); touching does not count.

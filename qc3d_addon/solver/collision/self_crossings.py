@@ -18,6 +18,8 @@ from .crossings import CrossingSearch
 # Stronger anchors fade out over this many rings of neighbors around crossing triangles: an abrupt end would show as a
 # crease.
 _FADING_RINGS = 4
+# How far a vertex may leave the box around its places in the keys: of their distance, and of the size.
+_ROOM, _LEAST_ROOM = 0.3, 1e-3
 
 
 class CrossingLimit:
@@ -34,12 +36,24 @@ class CrossingLimit:
         Positions in the two keys.
     still : (n,) bool
         Vertices that have the same place in both keys and in all shapes.
+    search : CrossingSearch, optional
+        A search among all triangles of a shape like the keys, which is used if it is of the same triangles.
     """
 
-    def __init__(self, faces: Ints, key0: Floats, key1: Floats, still: Bools) -> None:
+    def __init__(
+        self, faces: Ints, key0: Floats, key1: Floats, still: Bools, search: CrossingSearch | None = None
+    ) -> None:
         self._faces = faces
         # Two triangles that do not move cross in all shapes or in none.
-        self._search = CrossingSearch(faces, (key0, key1), ~still[faces].all(axis=1))
+        moving = ~still[faces].all(axis=1)
+        if search is not None and search.is_of(faces):
+            self._search = search.among(moving)
+        else:
+            self._search = CrossingSearch(faces, (key0, key1), moving)
+        # Most shapes lie near the straight lines between the keys, where far fewer triangles can meet.
+        room = _ROOM * np.linalg.norm(key1 - key0, axis=1)[:, None] + _LEAST_ROOM * float(np.ptp(key0, axis=0).max())
+        self._low, self._high = np.minimum(key0, key1) - room, np.maximum(key0, key1) + room
+        self._near = self._search.within(self._low, self._high)
         self._known: Ints | None = None
         self._allowed = 0
         try:
@@ -103,7 +117,8 @@ class CrossingLimit:
 
     def _codes(self, shape: Floats) -> Ints:
         """One code for each crossing pair of triangles of which at least one moves."""
-        pairs = self._search.pairs(shape)
+        is_near = bool((self._low <= shape).all() and (shape <= self._high).all())
+        pairs = (self._near if is_near else self._search).pairs(shape)
         return np.asarray(pairs[:, 0] * len(self._faces) + pairs[:, 1])
 
 

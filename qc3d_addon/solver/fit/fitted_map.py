@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import Floats
+from ..collision.self_crossings import CrossingLimit
 from ..keys.embedding import Cube, Embedding
 from ..keys.keypair import KeyPair
 from ..numerics.rotations import determinants
@@ -118,6 +119,12 @@ class FittedMap:
     def surface_path(self) -> SurfacePath:
         """The surface path between the keys; cached, because setting it up takes as long as several frames."""
         return self.path or path_between(self.embedding, self.options)
+
+    @cached_property
+    def crossings(self) -> CrossingLimit:
+        """How much shapes between the keys may cross themselves; shapes are in cube units."""
+        keys, still = (self.embedding.key0, self.embedding.key1), self.surface_path.still
+        return CrossingLimit(self.pair.welded_faces, *keys, still, self.volume.search)
 
     @cached_property
     def fitter(self) -> FoldFreeFitter:

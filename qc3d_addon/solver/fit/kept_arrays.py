@@ -11,6 +11,7 @@ they follow from the maps.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ _MOST = 2**27  # numbers of an array
 # By so much, in squares of the cube's edge, a sphere around a tetrahedron misses the vertex across each of its faces:
 # a thousand times the rounding errors of the triangulation.
 _SURE = 1e-11
+_known: WeakKeyDictionary[TetMesh, bool] = WeakKeyDictionary()
 
 
 def arrays_of(mesh: TetMesh, maps: Floats, turns: Floats) -> dict[str, Bytes | Floats]:
@@ -86,7 +88,14 @@ def mesh_and_maps(stored: Mapping[str, NDArray[np.generic]], counts: tuple[int, 
 
 
 def _is_surely_delaunay(mesh: TetMesh) -> bool:
-    """Whether ``triangulate`` finds these tetrahedra in this order, on any machine."""
+    """Whether ``triangulate`` finds these tetrahedra in this order, on any machine; looked at once for each mesh."""
+    found = _known.get(mesh)
+    if found is None:
+        found = _known[mesh] = _looks_surely_delaunay(mesh)
+    return found
+
+
+def _looks_surely_delaunay(mesh: TetMesh) -> bool:
     found = triangulate(mesh.points)
     if not np.array_equal(found, mesh.tets):
         return False

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Floats, Ints
+from ..collision.crossings import CrossingSearch
 from ..keys.embedding import ROOM, Cube, Embedding
 from ..maps.volume_system import VolumeSystem
 from ..meshing.cube import fill_cube
@@ -42,6 +43,8 @@ class Volume:
         Sentences for the user, such as why another engine was used.
     cube : Cube, optional
         Where the cube stands, if it is not that of a single pair.
+    search : CrossingSearch, optional
+        Finds crossings of the first key's triangles, welded as it is itself, if several pairs share it.
     """
 
     mesh: TetMesh
@@ -51,6 +54,7 @@ class Volume:
     weights: Floats
     notes: tuple[str, ...] = ()
     cube: Cube | None = None
+    search: CrossingSearch | None = None
 
     @classmethod
     def filled(

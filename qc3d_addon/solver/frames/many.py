@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..collision.crossings import CrossingSearch
 from ..errors import QC3DError
 from ..fit.volume import Volume
 from ..keys.embedding import Cube, Embedding
@@ -67,6 +68,8 @@ class _Base:
             require_sizes(self.pair)
             cube = Cube.around(self.pair)
             volume = Volume.filled(Embedding.of(self.pair, cube), self.options, cube)
+            alone = replace(self.pair, key1=self.pair.key0)
+            volume = replace(volume, search=CrossingSearch(alone.welded_faces, [volume.key0]))
         except QC3DError:
             return None  # each of the keys says why
         # All of it now: later, two threads might make the same.
@@ -100,6 +103,11 @@ class _Bases:
         """The volume around the first key of a pair, if there is one."""
         found = (made for base, made in zip(self.shared, self._volumes, strict=True) if base.is_of(pair, options))
         return next(found, None)
+
+    def sharing(self, pair: KeyPair, options: FitOptions) -> KeyPair:
+        """A pair of its own, whose results are dropped with it, except for those that it shares with others."""
+        base = next((base for base in self.shared if base.is_of(pair, options)), None)
+        return replace(pair) if base is None else pair.sharing(base.pair)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +210,8 @@ def _beside_each_other(
     stop = threading.Event()
 
     def work(number: int) -> None:
-        # With pairs of its own: what they compute and keep is dropped with the task.
-        pairs = {ends: replace(pair) for ends, pair in tasks[number].pairs.items()}
+        options = tasks[number].fit_options
+        pairs = {ends: bases.sharing(pair, options) for ends, pair in tasks[number].pairs.items()}
         task = replace(tasks[number], pairs=pairs)
         try:
             with alone() if at_once > 1 else nullcontext():

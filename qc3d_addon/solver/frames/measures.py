@@ -15,7 +15,6 @@ from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
 from ..maps.distortion import TriangleStretches, approximate_singular_values, dilatation, extreme_stretch, volume_ratio
 from ..support.threads import in_threads
-from ..triangles.topology import sides, unique_edges
 from .report import WorstStretch
 
 _MOST = 1e6  # larger ratios only say that something is flat
@@ -150,7 +149,7 @@ class EdgeExcess:
     def __init__(self, pair: KeyPair) -> None:
         # Squares of what is very large or very small are no numbers.
         self._unit = max(pair.diagonal, float(np.ptp(pair.key1, axis=0).max()))
-        self.edges = unique_edges(np.concatenate([sides(pair.faces), pair.edges]))
+        self.edges = pair.every_edge
         ends = self._lengths(pair.key0), self._lengths(pair.key1)
         shortest, longest = np.minimum(*ends), np.maximum(*ends)
         usable = shortest > _SHORTEST * (pair.diagonal / self._unit)
@@ -162,7 +161,8 @@ class EdgeExcess:
         return np.asarray(np.maximum(length / self._longest - 1.0, 1.0 - length / self._shortest))
 
     def _lengths(self, shape: Floats) -> Floats:
-        return np.asarray(np.linalg.norm((shape[self.edges[:, 0]] - shape[self.edges[:, 1]]) / self._unit, axis=1))
+        spans = (shape[self.edges[:, 0]] - shape[self.edges[:, 1]]) / self._unit
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))
 
 
 def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:

@@ -18,7 +18,7 @@ _SYMMETRIC = 1e-5
 # something that turns over.
 _ONE_SIDED = 0.05
 # Vertices that are looked at first: most planes are none of symmetry, which these few tell.
-_FIRST_LOOK = 20
+_FIRST_LOOK = 60
 # So many vertices are tried, each with so many partners.
 _TRIED = 24
 
@@ -50,13 +50,15 @@ class MirrorImages:
         point = both.mean(axis=0)
         normals = _candidates([key - point for key in keys], _SYMMETRIC * self._size)
         tree = cKDTree(np.concatenate(keys, axis=1))
+        some = np.unique(np.linspace(0, len(both) // 2 - 1, _FIRST_LOOK, dtype=np.int64))
         self._planes: list[_Plane] = []
         for normal in normals:
             if any(abs(normal @ plane.normal) > 1.0 - _SYMMETRIC for plane in self._planes):
                 continue
-            images = np.concatenate([_reflected(key, normal, point) for key in keys], axis=1)
-            if np.max(tree.query(images[:_FIRST_LOOK])[0]) > _SYMMETRIC * self._size:
+            images = np.concatenate([_reflected(key[some], normal, point) for key in keys], axis=1)
+            if np.max(tree.query(images)[0]) > _SYMMETRIC * self._size:
                 continue
+            images = np.concatenate([_reflected(key, normal, point) for key in keys], axis=1)
             distances, found = tree.query(images)
             partners: Ints = np.asarray(found, dtype=np.int64)
             numbers = np.arange(len(partners))

@@ -50,8 +50,7 @@ class NaturalFrames:
         self._turns = turns = bool(self._spins) or self._surface.returns
         if fitted.options.extra_turns and not turns:
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
-        faces = fitted.pair.welded_faces
-        with beside(lambda: CrossingLimit(faces, embedding.key0, embedding.key1, self.still)) as limit:
+        with beside(lambda: fitted.crossings) as limit:
             turning = turning_inside(fitted, self._surface)
             self._volume = VolumePath(fitted.volume.system, fitted.maps, turning, fitted.options.stretch)
         self._limit = limit.result()

@@ -138,7 +138,8 @@ def played(
         members = np.flatnonzero(segments == number)
         stretch = max(stretch, worst_excess(pair, shown[members]).excess)
         lost += volumes[number].deviations(shown[members], local[members])
-        crossings += _new_crossings(pair, shown[members])
+        fitted = fits[number] if frames.mode == "natural" else None
+        crossings += _new_crossings(pair, fitted, shown[members], local[members])
         if fits:
             first, last = np.searchsorted(weights.knots, bake.times[moments.keys[number : number + 2]])
             knots, maps = weights.knots[first : last + 1], shapes.maps[first : last + 1]
@@ -208,10 +209,12 @@ def _between(knots: Floats, frames: FrameOptions, pairs: int) -> tuple[Floats, I
     return positions, *KeyTimes.of(frames, pairs).split(positions)
 
 
-def _new_crossings(pair: KeyPair, shapes: Floats) -> list[int | None]:
-    """For each shape (p, n, 3), the number of crossing pairs of triangles beyond that of the worse key."""
-    crossings = PairCrossings(pair)
-    return list(in_threads(crossings.excess, shapes))
+def _new_crossings(pair: KeyPair, fitted: FittedMap | None, shapes: Floats, times: Floats) -> list[int | None]:
+    """For each shape (p, n, 3) at a time (p,), how many more pairs of triangles cross than in the worse key."""
+    if fitted is None or fitted.pair.planes:  # the map of a mirrored whole knows the crossings of the whole
+        return list(in_threads(PairCrossings(pair).excess, shapes))
+    places = [fitted.embedding.to_cube(shape, time) for shape, time in zip(shapes, times.tolist(), strict=True)]
+    return list(in_threads(fitted.crossings.excess, places))
 
 
 def _with_keys(fitted: FittedMap, maps: Sequence[Floats]) -> Floats:

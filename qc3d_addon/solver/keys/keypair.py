@@ -17,7 +17,7 @@ from ..arrays import Floats, Ints
 from ..errors import InputError, naming_pair
 from ..settings import Mirror
 from ..triangles.polygons import covering, flat_quads
-from ..triangles.topology import sides, welded
+from ..triangles.topology import sides, unique_edges, welded
 from .halves import MirrorPlane, Whole, mirror_planes
 
 # The names of the first and the second key of a pair.
@@ -114,6 +114,21 @@ class KeyPair:
         keys = (self.key0[vertices], self.key1[vertices])
         return KeyPair(*keys, self.faces[triangles], self.edges[wires], self.polygons[triangles])
 
+    def sharing(self, other: KeyPair) -> KeyPair:
+        """The same pair, which takes over what another pair of the same first key, faces, edges and polygons knows."""
+        found = replace(self)
+        vars(found).update(covering=other.covering, every_edge=other.every_edge)
+        if other._is_apart:
+            every = np.arange(len(self.key0))
+            vars(found)["welding"] = (every, every)
+        return found
+
+    @cached_property
+    def _is_apart(self) -> bool:
+        """Whether no vertices coincide in the first key; then none do in both."""
+        reach = _rounding(self.key0)
+        return len(welded(self.key0, self.key0, (reach, reach))[0]) == len(self.key0)
+
     @cached_property
     def diagonal(self) -> float:
         """Length of the first key's bounding-box diagonal, the unit of all relative errors.
@@ -138,6 +153,11 @@ class KeyPair:
         """(m, 3) the triangles with each vertex replaced by its group's representative, so that they join at seams."""
         vertices, group = self.welding
         return np.asarray(vertices[group[self.faces]])
+
+    @cached_property
+    def every_edge(self) -> Ints:
+        """(k, 2) the sides of all triangles and the other edges, each once, smaller vertex first."""
+        return unique_edges(np.concatenate([sides(self.faces), self.edges]))
 
     @cached_property
     def covering(self) -> tuple[Ints, Floats]:

@@ -279,6 +279,9 @@ class _Forest:
     def carried(self, values: Floats, align: Callable[[Floats, Floats], Floats]) -> Floats:
         """Walk outward from the roots, level by level, aligning each value with that of its parent."""
         result = values.copy()
+        every = self._by_depth[self._starts[0] :]
+        if np.array_equal(align(values[every], values[self._parents[every]]), values[every]):
+            return result  # each agrees with its parent as it is
         for begin, end in pairwise(self._starts):
             members = self._by_depth[begin:end]
             result[members] = align(values[members], result[self._parents[members]])

@@ -139,4 +139,5 @@ def _tolerable(excess: Floats) -> Floats:
 
 
 def _lengths(shape: Floats, edges: Ints) -> Floats:
-    return np.asarray(np.linalg.norm(shape[edges[:, 1]] - shape[edges[:, 0]], axis=1))
+    spans = shape[edges[:, 1]] - shape[edges[:, 0]]
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))

@@ -104,3 +104,20 @@ class TestKeyPair:
     def test_sizes_that_only_mode_straight_takes(self, key0: np.ndarray, key1: np.ndarray, sentence: str) -> None:
         with pytest.raises(InputError, match=re.escape(sentence) + ".*choose the mode straight"):
             require_sizes(KeyPair.checked(key0, key1, FACES))
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 0.5])
+def test_a_pair_that_shares_knows_the_same(gap: float) -> None:
+    """Also where vertices coincide: in the first key only, in both, or in none."""
+    key0 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    key0[3:5, 2] += gap
+    faces = np.array([[0, 1, 2], [3, 5, 4]])
+    keys = [key0 + [0.0, 0.0, 1.0], key0 + np.linspace(0.0, 1.0, 6)[:, None]]
+    base, *others = (KeyPair.checked(key0, key, faces, [[0, 5]]) for key in (key0, *keys))
+    for pair in others:
+        shared = pair.sharing(base)
+        for name in ("welding", "covering"):
+            for found, expected in zip(getattr(shared, name), getattr(pair, name), strict=True):
+                np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(shared.every_edge, pair.every_edge)
+        np.testing.assert_array_equal(shared.key1, pair.key1)

@@ -5,6 +5,8 @@
 #   make test     everything: environment, ruff, mypy, pytest
 #   make quick    the solver's tests without the slow ones, for while you work: no Blender
 #   make assets   make the demo files again with the script that made them
+#   make figures  make the pictures and tables of the documentation again, and say which changed; hours, see
+#                 python -m benchmarks.regenerate --list
 #   make site     the documentation as a site, in site/
 #   make extension   the packages for Blender, one for each platform, in dist/; PLATFORM=linux-x64 makes only this one,
 #                    EXTRA_PYTHON=3.14 a test build with wheels for one more Python
@@ -19,7 +21,7 @@ endif
 VENV := .venv-$(VERSION)
 BIN := $(VENV)/bin
 
-.PHONY: demo test quick lint assets site extension clean
+.PHONY: demo test quick lint assets figures site extension clean
 
 FIGURE := qc3d_addon/demo/figure.blend
 BEND := --object Arm --from Basis --to Bend
@@ -49,6 +51,9 @@ lint: $(VENV)/installed
 
 assets: $(VENV)/installed
 	$(BIN)/python assets/make_assets.py
+
+figures: $(VENV)/installed
+	$(BIN)/python -m benchmarks.regenerate
 
 site: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --editable '.[docs]'

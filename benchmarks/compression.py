@@ -3,7 +3,7 @@
 """Bytes of maps and frames at equal error, by QC3D and by other ways, as Markdown tables.
 
     pip install "qc3d[benchmark]"
-    python -m benchmarks.compression --data FOLDER [--errors 1e-3]
+    python -m benchmarks.compression --data FOLDER [--errors 1e-3] [--only maps|frames]
 
 FOLDER contains head.npz, body.npz and horse.npz.
 """
@@ -21,13 +21,15 @@ import numpy as np
 
 from benchmarks.rivals import Rivals
 from qc3d_addon.solver.arrays import Floats, Ints
-from qc3d_addon.solver.compression.codec import Codec, Scheme
+from qc3d_addon.solver.compression.codec import Codec
+from qc3d_addon.solver.compression.compressed import Scheme
 from qc3d_addon.solver.compression.files import Packer, Source
 from qc3d_addon.solver.compression.pack import Small, diagonal_of, small_frames, small_maps
 from qc3d_addon.solver.compression.search import Compressor
 from qc3d_addon.solver.errors import ReconstructionError
+from qc3d_addon.solver.frames.bake_settings import Settings
 from qc3d_addon.solver.frames.key_times import KeyTimes
-from qc3d_addon.solver.frames.remade import Settings, small_bake
+from qc3d_addon.solver.frames.remade import small_bake
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.settings import FrameOptions
@@ -35,7 +37,7 @@ from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
 
-ERRORS = (1e-2, 3e-3, 1e-3, 1e-4)
+ERRORS = (1e-2, 3e-3, 1e-3, 1e-4, 1e-5)
 COUNTS = (16, 60)  # of modes
 HORSE = shapes.Pose("horse.npz", "", "bind", "Gallop_0", "y")
 MAPS = (shapes.DATA_FACES[1], shapes.DATA_BODIES[2], HORSE)
@@ -49,15 +51,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, metavar="FOLDER")
     parser.add_argument("--errors", type=float, nargs="+", default=ERRORS, metavar="E")
+    parser.add_argument("--only", choices=("maps", "frames"))
     arguments = parser.parse_args()
     wanted = arguments.errors
-    for pose in MAPS:
+    for pose in MAPS if arguments.only != "frames" else ():
         fitted = shapes.fitted(shapes.read(pose, arguments.data))
         mesh, targets = fitted.mesh, fitted.mapped[None]
         ways: dict[str, OfError] = {"**QC3D**": partial(_small_map, mesh, targets)}
         _print(f"map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways, wanted)
         _print_named(mesh, targets)
-    for through, between in CHAINS:
+    for through, between in CHAINS if arguments.only != "maps" else ():
         frames, faces, settings, polygons = _baked(arguments.data / "body.npz", through, between)
         ways = {
             "**QC3D**": partial(_small_bake, frames, faces, settings, polygons),

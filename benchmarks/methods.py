@@ -16,13 +16,14 @@ from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.settings import FitOptions, Mode
 from qc3d_addon.solver.support.progress import finish
 
-from .classical import arap, poisson
+from .classical import arap, arap_surface, corrective_smooth, poisson, rotational
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 OURS: tuple[Mode, ...] = ("linear", "natural")
-METHODS = ("straight", "poisson", "arap", *OURS)
+PEERS = ("rotational", "smooth", "surface", "poisson", "arap")
+METHODS = ("straight", *PEERS, *OURS)
 
 
 class Outcome(NamedTuple):
@@ -54,6 +55,12 @@ class Contest:
         if method == "straight":
             weight = self.times[:, None, None]
             frames = (1.0 - weight) * self.key0 + weight * self.key1
+        elif method == "rotational":
+            frames = rotational.frames(self.key0, self.key1, self.times)
+        elif method == "smooth":
+            frames = corrective_smooth.frames(self.key0, self.key1, self.faces, self.times)
+        elif method == "surface":
+            frames = arap_surface.frames(self.key0, self.key1, self.faces, self.times)
         elif method == "poisson":
             frames = poisson.frames(self.key0, self.key1, self.faces, self.times)
         elif method == "arap":

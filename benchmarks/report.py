@@ -14,8 +14,11 @@ from .verdict import CLASSICAL, RIVALRY, Verdict, always_measure
 
 WRITER = "benchmarks/inbetweens.py"
 BEGIN, END = (f"<!-- {place}: written by {WRITER} -->" for place in ("begin", "end"))
-NAMES = {"straight": "straight", "linear": "`linear`", "natural": "`natural`", "poisson": "Poisson", "arap": "ARAP"}
-ORDER = tuple(method for method in ("straight", "linear", "poisson", "arap", "natural") if method in METHODS)
+NAMES = {
+    "straight": "straight", "rotational": "arcs", "smooth": "smooth", "surface": "ARAP surface", "poisson": "Poisson",
+    "arap": "ARAP", "linear": "`linear`", "natural": "`natural`",
+}  # fmt: skip
+ORDER = METHODS
 
 
 def figure(value: float | None) -> str:
@@ -38,11 +41,33 @@ def measure_table(verdicts: Sequence[Verdict], measure: str) -> str:
     for verdict in verdicts:
         limit = verdict.limits.get(measure)
         cells = [figure(verdict.worst(method, measure)) for method in methods]
-        rows.append([f"{verdict.pair.file} {verdict.pair.first} → {verdict.pair.second}", *cells, figure(limit)])
+        rows.append([_name(verdict), *cells, figure(limit)])
         if "natural" in methods:
             rows[-1].append(verdict.rivalry(measure) if "natural" in verdict.figures else "-")
     header = ["pair", *(NAMES[method] for method in methods), "limit"]
     return table(header + ["against Poisson, ARAP"] * ("natural" in methods), rows)
+
+
+def crossings_table(verdicts: Sequence[Verdict]) -> str:
+    """Table of the most new crossings of all methods in an inner frame."""
+    rows = []
+    for verdict in verdicts:
+        found = [verdict.worst(method, "intersections") for method in ORDER]
+        rows.append([_name(verdict), *("-" if count is None else f"{count:.0f}" for count in found)])
+    return table(["pair", *(NAMES[method] for method in ORDER)], rows)
+
+
+def seconds_table(verdicts: Sequence[Verdict]) -> str:
+    """Table of the seconds that all methods took for all frames; ours with what the fit takes."""
+    rows = []
+    for verdict in verdicts:
+        figures = [verdict.figures.get(method, {}).get("seconds") for method in ORDER]
+        rows.append([_name(verdict), *("-" if value is None else f"{value:.2f}" for value in figures)])
+    return table(["pair", *(NAMES[method] for method in ORDER)], rows)
+
+
+def _name(verdict: Verdict) -> str:
+    return f"{verdict.pair.file} {verdict.pair.first} → {verdict.pair.second}"
 
 
 def health_table(verdicts: Sequence[Verdict], method: str = "natural") -> str:
@@ -52,7 +77,7 @@ def health_table(verdicts: Sequence[Verdict], method: str = "natural") -> str:
         result = verdict.figures.get(method)
         if result is None:
             continue
-        name = f"{verdict.pair.file} {verdict.pair.first} → {verdict.pair.second}"
+        name = _name(verdict)
         if "error" in result:
             rows.append([name, *["-"] * 9, verdict.misses(method)[0]])
             continue
@@ -100,6 +125,8 @@ def document(verdicts: Sequence[Verdict]) -> str:
             parts.append(f"## {heading}")
             for measure in RIVALRY:
                 parts += [f"### {titles[measure]}", measure_table(chosen, measure)]
+            parts += ["### New crossings", crossings_table(chosen)]
+            parts += ["### Seconds for five frames", seconds_table(chosen)]
             if any("natural" in verdict.figures for verdict in chosen):
                 parts += ["### What must always hold, of `natural`", health_table(chosen)]
     if any(verdict.pair.file == "bar" for verdict in verdicts):
@@ -121,7 +148,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     for measure, name in zip(RIVALRY, ("lengths", "volume"), strict=True):
         said: list[Any] = [state for v in ours if (state := v.rivalry(measure)) != "-"]
         lines.append(
-            f"- Against both {' and '.join(NAMES[one] for one in CLASSICAL)} in {name}: better on "
+            f"- Against {' and '.join(NAMES[one] for one in CLASSICAL)}, where they were run, in {name}: better on "
             f"{said.count('better')} of {len(said)} pairs, not better but below the visible floor on "
             f"{said.count('below floor')}, worse on {said.count('worse')}."
         )

@@ -25,10 +25,18 @@ def revision() -> str:
     return head.stdout.strip() + ("+" if changed.stdout else "")
 
 
+def content(pair: Pair) -> str:
+    """Hash of the triangles and both shapes."""
+    digest = hashlib.sha256()
+    for array in pair.load():
+        digest.update(array.tobytes())
+    return digest.hexdigest()[:16]
+
+
 def fingerprint(method: str) -> str:
     """Hash of the sources that a result of the method depends on."""
     folder = "qc3d_addon/solver" if method in OURS else "benchmarks/classical"
-    sources = sorted((ROOT / folder).glob("*.py")) + [ROOT / "benchmarks/measures.py"]
+    sources = sorted((ROOT / folder).rglob("*.py")) + [ROOT / "benchmarks/measures.py"]
     digest = hashlib.sha256()
     for source in sources:
         digest.update(source.read_bytes())
@@ -54,17 +62,19 @@ class Results:
         return self.folder / ("_".join(parts) + suffix)
 
     def load(self, pair: Pair, method: str, *, current: bool = True) -> dict[str, Any] | None:
-        """The stored figures; None if there are none or, with ``current``, if they come from other sources."""
+        """The stored figures; None if there are none or, with ``current``, if sources or shapes were others."""
         path = self._path(pair, method, ".json")
         if not path.is_file():
             return None
         result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return None if current and result["fingerprint"] != self._fingerprints[method] else result
+        is_current = result["fingerprint"] == self._fingerprints[method] and result.get("content") == content(pair)
+        return result if is_current or not current else None
 
     def store(self, pair: Pair, method: str, result: dict[str, Any]) -> None:
         """Store figures together with the hash of the sources."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        stamped = {"revision": self._revision, "fingerprint": self._fingerprints[method]} | result
+        stamped = {"revision": self._revision, "fingerprint": self._fingerprints[method], "content": content(pair)}
+        stamped |= result
         self._path(pair, method, ".json").write_text(json.dumps(stamped, indent=1), encoding="utf-8")
 
     def store_frames(self, pair: Pair, method: str, faces: Ints, times: Floats, frames: Floats) -> None:

@@ -23,7 +23,8 @@ Array = NDArray[Any]
 # Makes bytes of displacements and says what comes back of them, for a number that is larger the coarser it is.
 Coder = Callable[[float], tuple[int, Array]]
 
-_HALVINGS = 18
+# Steps and bounds are looked for between these multiples of the error, to better than a hundredth.
+_FINEST, _COARSEST, _HALVINGS = 0.05, 200.0, 11
 
 
 class Rivals:
@@ -46,7 +47,7 @@ class Rivals:
 
     def sizes(self, error: float) -> dict[str, int | None]:
         """Bytes by the name of the way; None where its library is not installed."""
-        numbers = np.round(self._moved / self._step(error)).astype(np.int64)
+        numbers = np.round(self._moved / self._largest(self._rounded, error)).astype(np.int64)
         ordered = [numbers[:, order] for order in self._orders]
         found: dict[str, int | None] = {
             "deflate, file order": len(zlib.compress(_bytes(ordered[0]), 9)),
@@ -68,17 +69,12 @@ class Rivals:
         squares = ((restored - self._moved) ** 2).sum(axis=2).mean(axis=1)
         return float(np.sqrt(squares.max()) / self._unit)
 
-    def _step(self, error: float) -> float:
-        low, high = 1e-3 * error * self._unit, 1e3 * error * self._unit
-        for _ in range(2 * _HALVINGS):
-            middle = float(np.sqrt(low * high))
-            near = self._error(middle * np.round(self._moved / middle)) <= error
-            low, high = (middle, high) if near else (low, middle)
-        return low
+    def _rounded(self, step: float) -> tuple[int, Array]:
+        return 0, step * np.round(self._moved / step)
 
     def _reached(self, coder: Coder, error: float) -> int:
-        """The bytes of the coarsest code that is near enough."""
-        low, high, size = 1e-4 * error * self._unit, 1e2 * error * self._unit, 0
+        """The bytes of the coarsest code that is near enough; 0 where none is."""
+        low, high, size = _FINEST * error * self._unit, _COARSEST * error * self._unit, 0
         for _ in range(_HALVINGS):
             middle = float(np.sqrt(low * high))
             made, restored = coder(middle)
@@ -92,18 +88,31 @@ class Rivals:
         """Principal components along time, as few as are smallest, rounded, and factors in single precision."""
         flat = self._moved.reshape(len(self._moved), -1)
         vectors = np.linalg.eigh(flat @ flat.T)[1][:, ::-1]
-        sizes = []
-        for rank in range(1, min(len(flat), 8) + 1):
-            rows = (vectors[:, :rank].T @ flat).reshape(rank, *self._moved.shape[1:])
+        sizes: list[int] = []
+        for rank in range(1, len(flat) + 1):
+            basis = vectors[:, :rank]
+            rows = (basis.T @ flat).reshape(rank, *self._moved.shape[1:])
+            if self._error(np.tensordot(basis, rows, axes=1)) > 0.99 * error:
+                continue
 
-            def coder(step: float, rows: Array = rows, rank: int = rank) -> tuple[int, Array]:
-                numbers = np.round(rows / step).astype(np.int64)
-                restored = np.tensordot(vectors[:, :rank], step * numbers, axes=1)
-                return _lzma(_bytes(numbers[:, self._orders[1]])) + 4 * len(flat) * rank, restored
+            def coder(step: float, rows: Array = rows, basis: Array = basis) -> tuple[int, Array]:
+                return 1, np.tensordot(basis, step * np.round(rows / step), axes=1)
 
-            if size := self._reached(coder, error):
-                sizes.append(size)
+            step = self._largest(coder, error)
+            size = _lzma(_bytes(np.round(rows / step).astype(np.int64)[:, self._orders[1]])) + 4 * len(flat) * rank
+            if sizes and size > min(sizes):
+                break
+            sizes.append(size)
         return min(sizes)
+
+    def _largest(self, coder: Coder, error: float) -> float:
+        """The coarsest step that is near enough."""
+        low, high = _FINEST * error * self._unit, _COARSEST * error * self._unit
+        for _ in range(_HALVINGS):
+            middle = float(np.sqrt(low * high))
+            near = self._error(coder(middle)[1]) <= error
+            low, high = (middle, high) if near else (low, middle)
+        return low
 
     def _by_filter(self, name: str, error: float, module: Any) -> int:  # noqa: ANN401 - a library
         return self._reached(partial(self._filtered, name, module), error)
@@ -130,7 +139,9 @@ class Rivals:
 
     def _draco(self, module: Any, error: float) -> int:  # noqa: ANN401 - a library
         """Each displacement as a cloud of points, in the fewest bits that are near enough."""
-        for bits in range(1, 28):
+        # Steps of more than eight times the error are never near enough.
+        size = float(np.ptp(self._moved, axis=1).max())
+        for bits in range(max(1, int(np.log2(size / (8.0 * error * self._unit)))), 28):
             data = [module.encode(rows.astype(np.float32), None, bits, 10, preserve_order=True) for rows in self._moved]
             restored = np.stack([np.asarray(module.decode(each).points, dtype=np.float64) for each in data])
             if self._error(restored) <= error:

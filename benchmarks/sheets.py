@@ -11,7 +11,7 @@ import numpy as np
 from qc3d_paper.drawing.sheets import Row, save_sheet
 
 from .catalogue import Pair
-from .report import ORDER
+from .report import NAMES, ORDER
 from .results import Results
 
 SHOWN = (
@@ -25,7 +25,7 @@ SHOWN = (
 )
 Y_UP = ("head", "horse", "wolf", "fox")
 HEIGHTS = {"bar": 280}  # pixels of a row; a column must hold its label
-TITLES = {"straight": "straight", "linear": "linear", "poisson": "Poisson", "arap": "ARAP", "natural": "natural"}
+TITLES = {method: name.strip("`") for method, name in NAMES.items()}
 
 
 def save(results: Results, folder: Path) -> list[Path]:

@@ -49,6 +49,7 @@ class QC3DPreferences(bpy.types.AddonPreferences):
         layout.prop(self, "time_limit", text="Time Limit (Minutes)")
         layout.prop(self, "memory_limit", text="Memory Limit (MB)")
         layout.operator("qc3d.copy_report", icon='COPYDOWN')
+        layout.operator("qc3d.save_report", icon='FILE_TICK')
 
 
 def limits(context: bpy.types.Context) -> "Limits":

@@ -20,7 +20,7 @@ from .operators.bake_inbetweens import (
     QC3D_OT_rebake,
 )
 from .operators.bake_keys import KeyChoice, QC3D_OT_bake_keys
-from .operators.bug_report import QC3D_OT_copy_report
+from .operators.bug_report import QC3D_OT_copy_report, QC3D_OT_save_report
 from .operators.cancel import QC3D_OT_cancel
 from .operators.chains import (
     QC3D_OT_absolute_keys,
@@ -82,6 +82,7 @@ CLASSES = (
     QC3D_OT_forget_record,
     QC3D_OT_open_demo,
     QC3D_OT_copy_report,
+    QC3D_OT_save_report,
     QC3D_OT_add_inner_key,
     QC3D_OT_go_through_sculpted,
     QC3D_OT_keys_from_timeline,

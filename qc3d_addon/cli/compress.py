@@ -13,7 +13,8 @@ import numpy as np
 
 from ..solver.arrays import Floats
 from ..solver.compression import frames as frame_compression
-from ..solver.compression.codec import Boundary, Codec, Scheme
+from ..solver.compression.codec import Codec
+from ..solver.compression.compressed import Boundary, Scheme
 from ..solver.compression.fields import Space
 from ..solver.compression.files import Packer, Source
 from ..solver.compression.pack import (
@@ -153,15 +154,16 @@ def _small(arguments: argparse.Namespace, scheme: str, is_frames: bool, progress
 
 def _announce(vertices: int, count: int, space: Space) -> None:
     """Refuse what does not fit into memory, and say how much the rest will take."""
-    require_memory_for_compression(vertices, count, space.most_modes)
-    speech.say(f"needs about {compression_mb(vertices, count, space.most_modes):.0f} MB of memory")
+    about = (vertices, count, space.most_modes, space.is_surface)
+    require_memory_for_compression(*about)
+    speech.say(f"needs about {compression_mb(*about):.0f} MB of memory")
 
 
 def _of_frames(file: FrameFile, scheme: str) -> OfError:
     settings = file.settings
     if scheme == _STORED or settings is None:
         return lambda error: small_frames(file.frames, file.faces, error)
-    return lambda error: small_bake(file.frames, file.faces, error, settings, file.polygons)
+    return lambda error: small_bake(file.frames, file.faces, error, settings, file.polygons, file.collider)
 
 
 def _of_maps(mesh: TetMesh, targets: Floats, boundary: ChosenBoundary) -> OfError:
@@ -183,6 +185,7 @@ def _small_report(small: Small, points: Floats, targets: Floats, mesh: TetMesh |
         "folds": list(small.folds),
     }
     if mesh is not None:
+        report["unfolded"] = small.is_unfolded
         boundary = np.unique(mesh.boundary_faces)
         report["boundary_error"] = np.abs(small.restored - targets)[:, boundary].max(axis=(1, 2)).tolist()
     return report

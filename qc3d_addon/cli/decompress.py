@@ -20,7 +20,7 @@ from ..solver.files.npz import write_arrays
 from ..solver.frames.remade import restored
 from ..solver.maps.files import TARGET, TetFile, read_tets, require_format, write_tets
 from ..solver.support.progress import finish
-from .frame_files import holds, read_first_frame
+from .frame_files import holds, read_inputs
 from .options import print_notes
 from .progress_bars import StageBars
 
@@ -64,14 +64,15 @@ def _maps(data: bytes, source: Source) -> Floats:
 
 
 def _frames(data: bytes, path: Path, output: Path) -> None:
-    first, faces, polygons = read_first_frame(path)
-    source = frame_compression.source_of(first, faces)
+    inputs = read_inputs(path)
+    source = inputs.source
+    first = source.points
     if is_compact(data):
         with StageBars() as bars:
-            later = finish(restored(data, source, polygons), bars)
+            later = finish(restored(data, inputs), bars)
         frames = np.concatenate([first[None], later])
     else:
         frames = frame_compression.restored(first, from_bytes(data, source))
-    arrays = {"faces": faces, "frames": frames, "key0": first, "key1": frames[-1]}
+    arrays = {"faces": source.cells, "frames": frames, "key0": first, "key1": frames[-1]}
     with replacing(output) as unfinished:
         write_arrays(unfinished, arrays)

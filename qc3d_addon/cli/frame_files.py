@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading FRAMES.npz, the file of ``qc3d interpolate``: frames, faces, and how they were made."""
+"""Reading FRAMES.npz, the file of ``qc3d interpolate``: frames, faces, how they were made, what they do not enter."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..solver.arrays import Floats, Ints
+from ..solver.collision.colliders import Collider
 from ..solver.errors import InputError
 from ..solver.files.npz import Archive, open_archive
-from ..solver.frames.remade import Settings
+from ..solver.frames.bake_settings import Settings
+from ..solver.frames.remade import Inputs
 from ..solver.keys.files import polygon_labels
 from ..solver.keys.keypair import KeyPair
 from ..solver.support.memory import require_memory_for_frames
@@ -21,12 +23,13 @@ _MOST_SETTINGS = 20_000  # characters
 
 
 class FrameFile(NamedTuple):
-    """Frames (k, n, 3) of triangles (m, 3), the polygons of these (m,), and the settings of the bake, where known."""
+    """Frames (k, n, 3) of triangles (m, 3), the polygons of these (m,), and of the bake its settings and collider."""
 
     frames: Floats
     faces: Ints
     polygons: Ints | None
     settings: Settings | None
+    collider: Collider | None
 
 
 def holds(path: Path, name: str) -> bool:
@@ -46,21 +49,28 @@ def read_frame_file(path: Path) -> FrameFile:
         require_memory_for_frames(*header.shape[:2])
         frames, faces = archive.read(("frames", "faces")).values()
         settings = _settings(archive, path, len(frames))
-        labels = _polygons(archive, faces)
+        labels, collider = _polygons(archive, faces), collider_in(archive)
     # Every frame is a key of a pair with the first, and checked as such.
     pairs = [KeyPair.checked(frames[0], frame, faces, polygons=labels) for frame in frames]
     polygons = None if labels is None else pairs[0].polygons
-    return FrameFile(np.stack([pair.key1 for pair in pairs]), pairs[0].faces, polygons, settings)
+    return FrameFile(np.stack([pair.key1 for pair in pairs]), pairs[0].faces, polygons, settings, collider)
 
 
-def read_first_frame(path: Path) -> tuple[Floats, Ints, Ints | None]:
-    """The first key (n, 3), the triangles (m, 3) and, where the file has them, their polygons (m,)."""
+def read_inputs(path: Path) -> Inputs:
+    """What the frames of a small file are made from: the first key, the triangles, and what else the file has of it."""
     with open_archive(path, "faces and key0 are needed") as archive:
         require_memory_for_frames(1, archive.headers(["key0"])["key0"].rows)
         first, faces = archive.read(("key0", "faces")).values()
-        labels = _polygons(archive, faces)
+        labels, collider = _polygons(archive, faces), collider_in(archive)
     pair = KeyPair.checked(first, first, faces, polygons=labels)
-    return pair.key0, pair.faces, None if labels is None else pair.polygons
+    return Inputs.of(pair.key0, pair.faces, None if labels is None else pair.polygons, collider)
+
+
+def collider_in(archive: Archive) -> Collider | None:
+    """What frames must not enter: ``collider`` (k, c, 3), at each key or at all, and ``collider_faces`` (f, 3)."""
+    if "collider" not in archive:
+        return None
+    return Collider.checked(*archive.read(("collider", "collider_faces")).values())
 
 
 def _polygons(archive: Archive, faces: Ints) -> Ints | None:

@@ -8,14 +8,16 @@ import argparse
 from pathlib import Path
 
 from ..solver.files.atomic import replacing_all, require_writable
+from ..solver.files.npz import open_archive
+from ..solver.frames.bake_settings import Settings
 from ..solver.frames.files import write_frames
 from ..solver.frames.key_times import KeyTimes
 from ..solver.frames.modes import needs_fits
-from ..solver.frames.remade import Settings
 from ..solver.frames.task import Task, carry_out
 from ..solver.keys.files import read_pairs
 from ..solver.settings import FitOptions, FrameOptions
 from ..solver.support.progress import finish
+from .frame_files import collider_in
 from .options import (
     add_keys,
     add_mirror,
@@ -37,7 +39,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "pair",
         type=Path,
         metavar="PAIR.npz",
-        help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3), polygons (m,) where known",
+        help="faces (m, 3), shape_names (k,), V0, V1, ... (n, 3), polygons (m,) where known; collider (k, c, 3), at "
+        "each key or once, and collider_faces (f, 3), which the frames do not enter",
     )
     add_keys(command, "shape", "FRAMES.npz", "faces, frames, times, key0, key1, settings")
     add_mirror(command)
@@ -59,13 +62,16 @@ def _run(arguments: argparse.Namespace) -> None:
         needs_fits=needs_fits(frame.mode),
         mirror=arguments.mirror,
     )
-    task = Task(pairs, names, fit, frame, times)
+    with open_archive(arguments.pair, "faces, shape_names and V0, V1, ... are needed") as archive:
+        collider = collider_in(archive)
+    task = Task(pairs, names, fit, frame, times, collider=None if collider is None else collider.at_keys(len(names)))
     with StageBars() as bars:
         bake = finish(carry_out(task), bars).bake
     assert bake is not None
     settings = Settings.of_task(task, bake.frames)
     with replacing_all(*files) as (output, *reports):
-        write_frames(output, list(pairs.values()), bake.times, bake.frames, "" if settings is None else settings.text)
+        text = "" if settings is None else settings.text
+        write_frames(output, list(pairs.values()), bake.times, bake.frames, text, task.collider)
         for report in reports:
             write_json(report, bake.report.as_json())
     print_notes(bake.report.notes)

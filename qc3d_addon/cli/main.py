@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from ..solver.errors import InputError, reason
-from . import analyze, bake, combine, compress, decompress, export, interpolate, reconstruct, reproduce, speech
+from . import analyze, bake, combine, compress, decompress, export, interpolate, reconstruct, replay, reproduce, speech
 from .batch import command as batch
 from .failures import FAILURES, told
 from .version import version
@@ -50,7 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"qc3d {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    every = (interpolate, combine, bake, batch, export, analyze, reconstruct, compress, decompress, reproduce)
+    every = (interpolate, combine, bake, batch, export, analyze, reconstruct, compress, decompress, reproduce, replay)
     for command in every:
         command.add_to(commands)
     return parser

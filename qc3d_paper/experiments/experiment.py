@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 
 from qc3d_addon.solver.arrays import Bools, Floats
-from qc3d_addon.solver.compression.codec import Codec, exponential, logarithm
+from qc3d_addon.solver.compression.codec import Codec
+from qc3d_addon.solver.compression.logarithms import exponential, logarithm
 from qc3d_addon.solver.compression.modes import Spectrum, Transfer, spectrum
 from qc3d_addon.solver.compression.transfer_loss import transferred
 from qc3d_addon.solver.errors import ReconstructionError

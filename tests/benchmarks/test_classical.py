@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks import measures
 from benchmarks.catalogue import Pair
-from benchmarks.classical import arap, interior, poisson
+from benchmarks.classical import arap, arap_surface, corrective_smooth, interior, poisson, rotational
 from benchmarks.classical.gradients import GradientPath, RigidMotion, rotations_nearest
 from benchmarks.exact import bent, exact_shape, twisted
 
@@ -132,3 +132,40 @@ def test_a_twist_keeps_heights_and_a_bend_keeps_the_middle_lines_length() -> Non
     assert np.linalg.norm(np.diff(arc, axis=0), axis=1).sum() == pytest.approx(4.0, rel=1e-3)
     assert np.allclose(arc[50], 0.0)
     assert np.linalg.norm(arc[-1] - arc[0]) == pytest.approx(2.0 * 4.0 / np.pi)
+
+
+def test_arcs_about_the_center_keep_distances_from_it() -> None:
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    turned = Rotation.from_rotvec([0.0, 0.0, 1.2]).apply(points)
+    half = Rotation.from_rotvec([0.0, 0.0, 0.6]).apply([[1.0, 0.0, 0.0]])
+    frames = rotational.frames(points, turned, TIMES)
+    np.testing.assert_allclose(frames[[0, -1]], [points, turned], rtol=0.0, atol=1e-12)
+    lengths = np.linalg.norm(frames, axis=2)
+    np.testing.assert_allclose(lengths, np.broadcast_to(lengths[0], lengths.shape), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        rotational.frames(np.eye(3)[:1], np.array([[np.cos(1.2), np.sin(1.2), 0.0]]), [0.5])[0], half, atol=1e-12
+    )
+
+
+def test_where_there_is_no_one_arc_vertices_go_straight() -> None:
+    first, second = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]), np.array(
+        [[3.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
+    )
+    halfway = rotational.frames(first, second, [0.5])[0]
+    np.testing.assert_allclose(halfway, [[2.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], atol=1e-12)
+
+
+def test_corrective_smooth_meets_both_keys_to_single_precision(bar: dict[str, np.ndarray]) -> None:
+    frames = corrective_smooth.frames(bar["V0"], bar["V1"], bar["faces"], TIMES)
+    np.testing.assert_allclose(frames[[0, -1]], [bar["V0"], bar["V1"]], rtol=0.0, atol=1e-5)
+    assert np.abs(frames[2] - 0.5 * (bar["V0"] + bar["V1"])).max() > 1e-3
+
+
+def test_libigls_morph_meets_both_keys_and_keeps_a_rigid_motion_rigid(bar: dict[str, np.ndarray]) -> None:
+    pytest.importorskip("igl")
+    frames = arap_surface.frames(bar["V0"], bar["V1"], bar["faces"], TIMES)
+    np.testing.assert_allclose(frames[[0, -1]], [bar["V0"], bar["V1"]], rtol=0.0, atol=1e-5)
+    moved = Rotation.from_euler("xyz", [0.5, -1.0, 2.0]).apply(bar["V0"]) + (1.0, 2.0, 3.0)
+    edges = measures.edge_uses(bar["faces"])[0]
+    halfway = arap_surface.frames(bar["V0"], moved, bar["faces"], [0.5])[0]
+    assert np.abs(measures.edge_lengths(halfway, edges) - measures.edge_lengths(bar["V0"], edges)).max() < 1e-6

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,6 +14,9 @@ import scipy
 
 from qc3d_addon.blender.operators import common
 from qc3d_addon.blender.operators.bug_report import report_text, version, without_names
+from qc3d_addon.blender.store import mesh_data
+from qc3d_addon.solver.errors import InputError
+from qc3d_addon.solver.frames.bug_reports import read_bug_report
 
 SECRETS = ("Figure", "Lean", "Stretch", "Basis", "Secret", "alice")
 
@@ -72,3 +76,38 @@ def test_without_a_mesh() -> None:
 
 def test_the_button_copies_it() -> None:
     assert bpy.ops.qc3d.copy_report() == {'FINISHED'}
+
+
+def test_a_file_with_the_shapes_only_where_asked_for(figure: bpy.types.Object, tmp_path: Path) -> None:
+    figure.qc3d.from_key, figure.qc3d.to_key, figure.qc3d.count = "Basis", "Lean", 4
+    plain, full = tmp_path / "plain.zip", tmp_path / "full"
+    assert bpy.ops.qc3d.save_report(filepath=str(plain)) == {'FINISHED'}
+    assert read_bug_report(plain).task is None
+    assert bpy.ops.qc3d.save_report(filepath=str(full), with_shapes=True) == {'FINISHED'}
+    found = read_bug_report(full.with_suffix(".zip"))
+    assert found.text == report_text(bpy.context)
+    assert found.task is not None
+    assert found.task.play is not None
+    assert found.task.play.count == 4
+    (pair,) = found.task.pairs.values()
+    np.testing.assert_array_equal(pair.key1, mesh_data.key_coordinates(figure, "Lean"))
+
+
+def test_a_file_is_written_where_nothing_can_be_baked(figure: bpy.types.Object, tmp_path: Path) -> None:
+    path = tmp_path / "report.zip"
+    figure.qc3d.from_key = figure.qc3d.to_key = "Basis"
+    assert bpy.ops.qc3d.save_report(filepath=str(path), with_shapes=True) == {'FINISHED'}
+    with pytest.raises(InputError, match="two different"):
+        read_bug_report(path)
+    bpy.ops.object.armature_add()
+    assert bpy.ops.qc3d.save_report(filepath=str(path)) == {'FINISHED'}
+    assert "Active object: ARMATURE" in read_bug_report(path).text
+    with pytest.raises(RuntimeError, match="no shape keys to include"):
+        bpy.ops.qc3d.save_report(filepath=str(path), with_shapes=True)
+
+
+def test_a_file_that_cannot_be_written_is_an_error_of_one_sentence(figure: bpy.types.Object, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=r"report\.zip"):
+        bpy.ops.qc3d.save_report(filepath=str(tmp_path / "no folder" / "report.zip"))
+    with pytest.raises(RuntimeError, match="Name a file"):
+        bpy.ops.qc3d.save_report(filepath="")

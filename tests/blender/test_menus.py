@@ -46,5 +46,5 @@ def test_the_help_menu_has_the_demo_and_the_report() -> None:
     for draw in bpy.types.TOPBAR_MT_help.draw._draw_funcs:
         if draw.__module__.startswith("qc3d_addon"):
             draw(Menu, bpy.context)
-    assert [name for name, _ in Menu.layout.entries] == ["qc3d.open_demo", "qc3d.copy_report"]
+    assert [name for name, _ in Menu.layout.entries] == ["qc3d.open_demo", "qc3d.copy_report", "qc3d.save_report"]
     assert Menu.layout.operator_context == 'INVOKE_DEFAULT'  # otherwise nothing asks about unsaved changes

@@ -22,6 +22,7 @@ from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.settings import FitOptions, FrameOptions
 
 from ..command_lines import with_others
+from ..solver.meshes import icosphere
 
 QUICK = ["--quality", "normal", "--engine", "delaunay"]
 
@@ -318,3 +319,26 @@ class TestPolygonsAndHalves:
             assert not out["frames"][:, :4, 0].any()
         assert main.main(["interpolate", str(tmp_path / "half.npz"), *ends, "--mirror", "none"]) == 0
         assert "mirror image" not in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_collider_in_the_file(bar_file: Path, bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+    free, output = tmp_path / "free.npz", tmp_path / "frames.npz"
+    assert interpolate(bar_file, free, "--frames", "3") == 0
+    tip = np.load(free)["frames"][2][np.argmax(bar["V0"] @ [1.0, 1.0, 1.0])]
+    ball, faces = icosphere(1)
+    ball = tip + 0.3 * (ball - ball.mean(axis=0)) / np.ptp(ball, axis=0).max()
+    np.savez(tmp_path / "pair.npz", **bar, collider=ball[None], collider_faces=faces)
+    assert interpolate(tmp_path / "pair.npz", output, "--frames", "3") == 0
+    with np.load(output) as made:
+        assert made["collider"].shape == (2, *ball.shape)
+        assert np.abs(made["frames"] - np.load(free)["frames"]).max() > 1e-3
+        frames = made["frames"]
+    small, back = str(tmp_path / "small.qc3d"), tmp_path / "back.npz"
+    assert main.main(["compress", str(output), "--error", "1e-4", "--output", small]) == 0
+    assert main.main(["decompress", small, str(output), "--output", str(back)]) == 0
+    missed = np.load(back)["frames"] - frames
+    unit = np.linalg.norm(np.ptp(frames[0], axis=0))
+    assert np.sqrt((missed**2).sum(axis=2).mean(axis=1)).max() <= 1.001e-4 * unit
+    np.savez(tmp_path / "bad.npz", **bar, collider=ball, collider_faces=faces)
+    assert interpolate(tmp_path / "bad.npz", output, "--frames", "3") == 2

@@ -23,7 +23,7 @@ from numpy.lib import format as npy
 from qc3d_addon.cli.reconstruct import read_landmarks
 from qc3d_addon.solver.compression import compact
 from qc3d_addon.solver.compression import files as compressed_files
-from qc3d_addon.solver.compression.codec import Compressed
+from qc3d_addon.solver.compression.compressed import Compressed
 from qc3d_addon.solver.compression.fields import Field, Part, Space
 from qc3d_addon.solver.compression.pack import small_frames, small_maps, unpacked
 from qc3d_addon.solver.compression.smallest import Wanted, smallest
@@ -31,6 +31,7 @@ from qc3d_addon.solver.fit import files as map_files
 from qc3d_addon.solver.fit import storage
 from qc3d_addon.solver.fit.fitted_map import FittedMap
 from qc3d_addon.solver.frames import remade
+from qc3d_addon.solver.frames.bake_settings import Settings
 from qc3d_addon.solver.keys.files import read_pairs
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.maps.files import TetFile, read_tets, write_tets
@@ -201,9 +202,9 @@ def _small(kind: str) -> bytes:
         return finish(small_maps(_mesh(), np.stack([_moved(), _mesh().points]), 1e-3)).data
     if kind == "frames":
         return finish(small_frames(_frames(), _pair().faces, 1e-4)).data
-    space, settings = Space(_pair().key0, _pair().faces), remade.Settings((0, 3), (), frame_options=STRAIGHT)
+    space, settings = Space(_pair().key0, _pair().faces), Settings((0, 3), (), frame_options=STRAIGHT)
     keys = finish(smallest(Wanted(space, _frames()[-1:] - _pair().key0, 1.0, 1e-3)))
-    remaking = compact.Remaking(remade.packed_settings(settings, None), keys, 1e-3, 0.0)
+    remaking = compact.Remaking(remade.packed_settings(settings, remade.Inputs(_frame_source())), keys, 1e-3, 0.0)
     nothing = Field(Part("plain", 0, 0.0, np.zeros((3, 12, 3), dtype=np.int64)))
     return compact.to_bytes(_frame_source(), space, compact.Packed("frames", "sliding", 3, nothing, None, remaking))
 
@@ -221,7 +222,7 @@ def _read_small_maps(path: Path) -> None:
 
 
 def _read_small_frames(path: Path) -> None:
-    finish(remade.restored(compressed_files.read_bytes(path), _frame_source(), None))
+    finish(remade.restored(compressed_files.read_bytes(path), remade.Inputs(_frame_source())))
 
 
 _FORMATS: dict[str, tuple[str, Callable[[], bytes], Callable[[Path], None]]] = {

@@ -3,6 +3,7 @@
 """Follow the page *The first bake* in a real Blender, and take its pictures, and those of two other pages.
 
     QC3D_BLENDER_ROOT=... python -m tests.window.make_quickstart dist/qc3d-VERSION-linux-x64.zip docs/images
+    QC3D_BLENDER_ROOT=... python -m tests.window.make_quickstart docs/images   # only how to install, without a package
 
 The places that are clicked in the preferences are those of Blender 5.2 on a screen of 1280 x 800. If its Python is not
 3.11 or 3.13, make the package with ``EXTRA_PYTHON``.
@@ -58,15 +59,32 @@ def click(window: Window, x: int, y: int) -> None:
     time.sleep(SETTLE)
 
 
-def install(window: Window, pictures: Path, package: str) -> None:
-    """Get Extensions, Install from Disk; the file is chosen without Blender's dialog, which opens somewhere."""
+def where_to_install(pictures: Path) -> None:
+    """Only the picture of the preferences, which needs no package."""
+    root = os.environ.get("QC3D_BLENDER_ROOT")
+    reason = missing(root)
+    if reason is not None:
+        sys.exit(reason)
+    with Window(Path(root or ""), SCREEN, package=False) as window:
+        window.press("Escape")
+        open_menu(window, pictures)
+
+
+def open_menu(window: Window, pictures: Path) -> None:
+    """Get Extensions, and the menu with Install from Disk."""
     window.ask("bpy.ops.screen.userpref_show('INVOKE_DEFAULT')")
     window.place_window("Preferences", 200, 60, 900, 640)
     click(window, 257, 255)
     click(window, 1081, 78)
-    window.move(973, 200)
-    time.sleep(SETTLE)
+    for height in (194, 200):  # the entry lights up when the mouse moves over it, not when it appears there
+        window.move(973, height)
+        time.sleep(SETTLE)
     window.shoot(pictures / "quickstart-install.png", (200, 60, 900, 240))
+
+
+def install(window: Window, pictures: Path, package: str) -> None:
+    """Get Extensions, Install from Disk; the file is chosen without Blender's dialog, which opens somewhere."""
+    open_menu(window, pictures)
     window.press("Escape")
     where = f"filepath='/{HOME}/{package}', repo='user_default', enable_on_install=True"
     window.ask(f"bpy.ops.extensions.package_install_files({where})")
@@ -153,4 +171,5 @@ def heat_map(window: Window, pictures: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    given = [Path(word) for word in sys.argv[1:]]
+    main(*given) if len(given) == 2 else where_to_install(*given)

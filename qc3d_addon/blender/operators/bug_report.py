@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that copies what a bug report needs: versions, settings, numbers of the mesh and the last error.
+"""The operators that copy or save what a bug report needs: versions, settings, numbers of the mesh and the last error.
 
-Nothing in it identifies the user's work: no names of objects, keys, files or people, and no coordinates.
+Nothing in it identifies the user's work: no names of objects, keys, files or people, and no coordinates, unless the
+user asks for the shapes of the keys.
 """
 
-from __future__ import annotations
+# Blender reads properties from evaluated annotations: no "from __future__ import annotations" here.
 
 import platform
 import re
@@ -14,19 +15,23 @@ import tomllib
 from collections import Counter
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
+from bpy.props import BoolProperty, StringProperty
 
+from ...solver.errors import InputError, QC3DError
 from ...solver.settings import FitOptions, FrameOptions, PlayOptions
 from ..kinds import keys_of, mesh_of, present, shape_keys_of
 from ..preferences import limits
-from ..properties import ObjectSettings, settings_of
-from ..store import records
-from .common import Status, last_error
+from ..properties import ObjectSettings, bake_request, panel_keys, settings_of
+from ..store import mesh_data, records
+from .common import Status, last_error, report_error
 
 _PACKAGE = Path(__file__).parents[2]
 _MORE_SETTINGS = ("count", "use_tolerance", "tolerance", "play_on", "use_keyframes", "frame_start", "frame_end")
+_ENDING = ".zip"
 _NAMED = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"|(?:[A-Za-z]:)?[\\/]\S+")
 
 
@@ -40,6 +45,81 @@ class QC3D_OT_copy_report(bpy.types.Operator):
         present(context.window_manager).clipboard = report_text(context)
         self.report({'INFO'}, "The report was copied; paste it into the bug report.")
         return {'FINISHED'}
+
+
+class QC3D_OT_save_report(bpy.types.Operator):
+    """Save the report in a file, with the settings and, only if you choose it, the shapes of the keys in the panel"""
+
+    bl_idname = "qc3d.save_report"
+    bl_label = "Save Report for a Bug"
+
+    if TYPE_CHECKING:
+        filepath: str
+        filter_glob: str
+        check_existing: bool
+        with_shapes: bool
+    else:
+        filepath: StringProperty(name="File", subtype='FILE_PATH', options={'SKIP_SAVE'})
+        filter_glob: StringProperty(default=f"*{_ENDING}", options={'HIDDEN', 'SKIP_SAVE'})
+        check_existing: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
+        with_shapes: BoolProperty(
+            name="Include the Shapes",
+            description="Put the keys in the panel into the file, so that a developer can bake them again. Everyone "
+            "who gets the file can see them",
+            default=False,
+            options={'SKIP_SAVE'},
+        )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Status:
+        self.filepath = f"qc3d-report{_ENDING}"
+        present(context.window_manager).fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def execute(self, context: bpy.types.Context) -> Status:
+        try:
+            if not self.filepath:
+                raise InputError("Name a file to write.")
+            path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _ENDING))
+            save_report(context, path, self.with_shapes)
+        except QC3DError as error:
+            report_error(self, str(error))
+            return {'CANCELLED'}
+        shapes = "the shapes of the keys" if self.with_shapes else "no shapes"
+        self.report({'INFO'}, f"{path.name} has the settings and {shapes}; attach it to the bug report.")
+        return {'FINISHED'}
+
+
+def save_report(context: bpy.types.Context, path: Path, with_shapes: bool) -> None:
+    """Write the report and the settings of the active object's panel into a .zip.
+
+    Raises
+    ------
+    InputError
+        If there are no keys to include, or the file cannot be written.
+    """
+    from ...solver.files.atomic import replacing
+    from ...solver.frames.bug_reports import write_bug_report
+
+    text, obj = report_text(context), context.active_object
+    through: tuple[str, ...] = ()
+    options = FitOptions(), FrameOptions(), PlayOptions()
+    has_keys = obj is not None and obj.type == 'MESH' and shape_keys_of(obj) is not None
+    if obj is not None and has_keys:
+        try:
+            through = panel_keys(settings_of(obj))
+            request = bake_request(settings_of(obj), through).timed
+            options = request.fit_options, request.frame_options, request.play_options
+        except QC3DError as error:
+            text += f"\nThe settings cannot be used: {without_names(str(error))}\n"
+    mesh = shapes = None
+    if with_shapes:
+        if obj is None or not through:
+            raise InputError("There are no shape keys to include; choose an object with two keys, or leave them out.")
+        mesh, shapes = mesh_data.arrays_of(mesh_of(obj)), {
+            name: mesh_data.shown_coordinates(obj, name) for name in dict.fromkeys(through)
+        }
+    with replacing(path) as place:
+        write_bug_report(place, text, version(), through, options, mesh, shapes)
 
 
 def report_text(context: bpy.types.Context) -> str:

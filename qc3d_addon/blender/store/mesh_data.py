@@ -122,3 +122,8 @@ def wire_edges(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     is_wire[edge_of_corner] = False
     wires: NDArray[np.int32] = ends.reshape(-1, 2)[is_wire]
     return wires
+
+
+def arrays_of(mesh: bpy.types.Mesh) -> dict[str, NDArray[np.int32]]:
+    """What a file of keys needs of a mesh: its ``faces``, their ``polygons``, and the ``edges`` of no face."""
+    return {"faces": triangles(mesh), "edges": wire_edges(mesh), "polygons": polygons(mesh)}

@@ -9,7 +9,7 @@ import bpy
 from ..kinds import present
 from ..operators.bake_inbetweens import QC3D_OT_bake_inbetweens, QC3D_OT_rebake
 from ..operators.bake_keys import QC3D_OT_bake_keys
-from ..operators.bug_report import QC3D_OT_copy_report
+from ..operators.bug_report import QC3D_OT_copy_report, QC3D_OT_save_report
 from ..operators.open_demo import QC3D_OT_open_demo
 from ..operators.split_key import QC3D_OT_split_key
 
@@ -44,6 +44,7 @@ def _draw_help(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout.operator_context = 'INVOKE_DEFAULT'  # it asks before unsaved changes are lost
     layout.operator(QC3D_OT_open_demo.bl_idname, icon='ARMATURE_DATA')
     layout.operator(QC3D_OT_copy_report.bl_idname, text="Copy QC3D Report for a Bug", icon='COPYDOWN')
+    layout.operator(QC3D_OT_save_report.bl_idname, text="Save QC3D Report for a Bug", icon='FILE_TICK')
 
 
 _ENTRIES = (

@@ -22,7 +22,8 @@ from .. import speech
 from ..options import whole_number
 from ..version import version
 from . import child
-from .jobs import Job, read_jobs
+from .job import Job
+from .jobs import read_jobs
 from .orders import Ended, HowEnded, Order
 from .pools import Cluster, Pool, Processes
 from .records import State
@@ -149,6 +150,8 @@ def _carried_out(jobs: Sequence[Job], state: State, arguments: argparse.Namespac
         return Order(job, state, batch, threads, limit_mb)
 
     def say(job: Job, ended: Ended) -> None:
+        if ended.how == "stopped":
+            return  # the last line counts them
         memory = "" if ended.peak_memory_mb is None else f", {ended.peak_memory_mb:.0f} MB"
         took = f"  {ended.seconds:.1f} s{memory}" if ended.how == "done" else ""
         speech.say(on_one_line(f"{len(schedule.ended)}/{len(jobs)}  {ended.how:8}{job.name}{took}"))

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from .jobs import Job
+from .job import Job
 from .records import State
 
 ORDER, NEEDS, WAITS, ENDED = "order.json", "needs.json", "waits", "ended.json"

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 from ...solver.errors import InputError, with_remedy
 from ...solver.files.locks import lock
-from .jobs import Job
+from .job import Job
 
 _LARGEST = 10_000_000  # characters
 

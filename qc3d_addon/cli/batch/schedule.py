@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 
 from ...solver.errors import InputError
-from .jobs import Job
+from .job import Job
 from .orders import Ended, Order
 from .pools import Pool, lost
 from .records import State

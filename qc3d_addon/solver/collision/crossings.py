@@ -75,8 +75,8 @@ class CrossingSearch:
         """
         faster = copy.copy(self)
         if self._tree is not None:
-            lowest = np.min([low.T[:, corner] for corner in self._corners], axis=0)
-            highest = np.max([high.T[:, corner] for corner in self._corners], axis=0)
+            lowest = np.stack([low.T[:, corner] for corner in self._corners]).min(axis=0)
+            highest = np.stack([high.T[:, corner] for corner in self._corners]).max(axis=0)
             faster._tree = self._tree.within(lowest, highest)
         return faster
 

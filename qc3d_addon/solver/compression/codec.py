@@ -20,68 +20,29 @@ The boundary is not stored where it slides: the conditions of the rebuilding giv
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 
 from ..arrays import Bools, Floats
 from ..errors import InputError
-from ..maps.boundary_conditions import Conditions
 from ..maps.mapping import Mapping
 from ..maps.reconstruction import reconstruct
 from ..maps.representation import from_upper_triangle, upper_triangle
 from ..tets.mesh import TetMesh
+from .compressed import Boundary, Compressed, Scheme, whole_steps
+from .held_boundary import HeldBoundary
+from .logarithms import exponential, logarithm
 from .modes import Spectrum, Transfer, spectrum
-from .nearest_map import MOST_LOGARITHM, NORM, NearestMap
+from .nearest_map import NORM, NearestMap
 
-Scheme = Literal["published", "logarithm", "fitted"]
-Boundary = Literal["sliding", "fixed"]  # a fixed one exactly, or in steps
-
-# Numbers beyond so many steps do not fit the format; a step that makes larger ones is too small to be of use.
-MOST_STEPS = 2**40
 # Steps of the search for the nearest map: for the first of a row of maps, and for those that begin at the one before.
 _FIRST_ITERATIONS, _NEXT_ITERATIONS = 60, 20
 _CHECK_TOLERANCE = 1e-6
 _ZERO = 1e-9  # of the largest eigenvalue
 _MOST_WORK = 30_000_000  # tetrahedra of maps that are rebuilt for one file: about four minutes of one core
-
-
-@dataclass(frozen=True, eq=False)
-class Compressed:
-    """F maps of one mesh as whole numbers, all with the same steps.
-
-    Parameters
-    ----------
-    scheme, boundary
-    step : float
-        What the number 1 stands for in the lowest mode.
-    numbers : (F, k, 6) int64
-        Coefficients of the six channels in steps, by mode.
-    held : (F, b, 3)
-        Images of the boundary's vertices where it is fixed, in the order of their numbers; none where it slides.
-    check : float
-        A sum over the rebuilt maps, by which the restoring knows that it has rebuilt the same ones.
-    remainder_step : float
-        What the number 1 stands for in the remainder, in units of the map.
-    remainder : (F, n, 3) int64
-        Displacements that follow the rebuilding, in steps; n is 0 for none.
-    held_step : float
-        In what steps the images of a fixed boundary are from where it was; 0 where they are exact.
-    """
-
-    scheme: Scheme
-    boundary: Boundary
-    step: float
-    numbers: NDArray[np.int64]
-    held: Floats
-    check: float = 0.0
-    remainder_step: float = 0.0
-    remainder: NDArray[np.int64] | None = None
-    held_step: float = 0.0
 
 
 class Codec:
@@ -118,7 +79,7 @@ class Codec:
         known: Spectrum | None = None,
         held_step: float = 0.0,
     ) -> None:
-        self.held_step = held_step if boundary == "fixed" else 0.0
+        self._held = HeldBoundary(mesh, boundary, held_step if boundary == "fixed" else 0.0)
         self.mesh, self.scheme, self.boundary = mesh, scheme, boundary
         self.observes_map = observed is None
         self._observed = csr_array(eye_array(len(mesh.points))) if observed is None else observed
@@ -139,12 +100,8 @@ class Codec:
     def _kept(self) -> Bools:
         """(n, 3) what the conditions give exactly, so that no remainder is needed."""
         if self.observes_map:
-            return self._conditions(np.zeros((self._boundary_rows.size, 3))).held
+            return self._held.conditions(np.zeros((self._held.rows.size, 3))).held
         return np.zeros(self.points.shape, dtype=bool)
-
-    @cached_property
-    def _boundary_rows(self) -> NDArray[np.int64]:
-        return np.unique(self.mesh.boundary_faces) if self.boundary == "fixed" else np.empty(0, dtype=np.int64)
 
     def projected(self, mapping: Mapping, modes: int) -> Floats:
         """(k, 6) coefficients of a map's representation, off-diagonal channels times the root of two.
@@ -180,7 +137,7 @@ class Codec:
             else:
                 iterations = _FIRST_ITERATIONS
                 start = self.projected(Mapping(self.mesh, values), modes) if self.observes_map else np.zeros((modes, 6))
-            problem = NearestMap(self.mesh, self._conditions(kept), self._observed)
+            problem = NearestMap(self.mesh, self._held.conditions(kept), self._observed)
             found.append(
                 problem.coefficients(self._at_tets[:, :modes], start, self.steps(modes), values, iterations)
             )
@@ -211,9 +168,9 @@ class Codec:
             self.scheme,
             self.boundary,
             step,
-            _whole(coefficients / steps, step),
+            whole_steps(coefficients / steps, step),
             self.held(targets),
-            held_step=self.held_step,
+            held_step=self._held.step,
         )
         rebuilt = self.rebuilt(compressed)
         return replace(compressed, check=self._check(rebuilt)), rebuilt
@@ -229,19 +186,19 @@ class Codec:
         ReconstructionError
             If a representation is not positive definite, which happens with the scheme ``published``.
         """
-        numbers, held = compressed.numbers, compressed.held
-        changes = (np.diff(numbers, axis=0) != 0).any(axis=(1, 2)) | (np.diff(held, axis=0) != 0.0).any(axis=(1, 2))
+        changes = compressed.changes
         if (1 + np.count_nonzero(changes)) * len(self.mesh.tets) > _MOST_WORK:
             raise InputError(
                 f"{1 + np.count_nonzero(changes)} different maps of {len(self.mesh.tets)} tetrahedra take too long to "
                 f"rebuild; at most {_MOST_WORK // len(self.mesh.tets)} are."
             )
         maps: list[Floats] = []
-        for number, place in enumerate(held):
+        for number, place in enumerate(compressed.held):
             if number and not changes[number - 1]:
                 maps.append(maps[-1])
             else:
-                maps.append(reconstruct(self.mesh, self.stretch(compressed, number), self._conditions(place)).values)
+                stretch, conditions = self.stretch(compressed, number), self._held.conditions(place)
+                maps.append(reconstruct(self.mesh, stretch, conditions).values)
         return np.stack(maps)
 
     def restore(self, compressed: Compressed) -> Floats:
@@ -275,7 +232,7 @@ class Codec:
 
     def with_remainder(self, compressed: Compressed, missed: Floats, step: float) -> Compressed:
         """The same with what is missed, (F, n, 3), as multiples of a step; InputError if that is too small."""
-        numbers = _whole(np.where(self._kept, 0.0, missed) / step, step)
+        numbers = whole_steps(np.where(self._kept, 0.0, missed) / step, step)
         return replace(compressed, remainder_step=step, remainder=numbers)
 
     def stretch(self, compressed: Compressed, number: int) -> Floats:
@@ -289,56 +246,9 @@ class Codec:
 
     def held(self, targets: Floats) -> Floats:
         """(F, b, 3) images of a fixed boundary; raises InputError for maps that cannot be compressed."""
-        if not self.observes_map:
-            return np.empty((len(targets), 0, 3))
-        for values in targets:
-            folds = Mapping(self.mesh, values).folds
-            if folds:
-                raise InputError(f"The map has {folds} folded tetrahedra; only those without can be compressed.")
-            on_faces = self.mesh.on_cube_face
-            if self.boundary == "sliding" and not np.array_equal(values[on_faces], self.mesh.points[on_faces]):
-                raise InputError(
-                    "The map moves the cube's faces out of themselves; compress it with a fixed boundary."
-                )
-        images = np.asarray(targets[:, self._boundary_rows])
-        if not self.held_step:
-            return images
-        before = self.mesh.points[self._boundary_rows]
-        return np.asarray(before + self.held_step * np.round((images - before) / self.held_step))
-
-    def _conditions(self, held: Floats) -> Conditions:
-        if self.boundary == "sliding":
-            return Conditions.sliding_cube(self.mesh)
-        if held.shape != (len(self._boundary_rows), 3):
-            raise InputError(
-                f"The stored boundary has {len(held)} vertices, that of the mesh {len(self._boundary_rows)}."
-            )
-        values = np.array(self.mesh.points)
-        values[self._boundary_rows] = held
-        return Conditions.fixed_boundary(self.mesh, values)
+        return self._held.images(targets) if self.observes_map else np.empty((len(targets), 0, 3))
 
     def _check(self, rebuilt: Floats) -> float:
         """A sum with signs that no symmetry has."""
         signs = 1.0 - 2.0 * (np.arange(rebuilt.size, dtype=np.uint64) * np.uint64(2654435761) >> np.uint64(16) & 1)
         return float(signs @ rebuilt.ravel() / np.sqrt(rebuilt.size))
-
-
-def logarithm(stretch: Floats) -> Floats:
-    """(M, 3, 3) logarithms of symmetric positive definite matrices."""
-    values, vectors = np.linalg.eigh(stretch)
-    return np.asarray((vectors * np.log(values)[:, None]) @ vectors.transpose(0, 2, 1))
-
-
-def exponential(matrices: Floats) -> Floats:
-    """(M, 3, 3) exponentials of symmetric matrices: symmetric positive definite ones."""
-    values, vectors = np.linalg.eigh(matrices)
-    stretches = np.exp(np.clip(values, -MOST_LOGARITHM, MOST_LOGARITHM))
-    product = (vectors * stretches[:, None]) @ vectors.transpose(0, 2, 1)
-    return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))
-
-
-def _whole(multiples: Floats, step: float) -> NDArray[np.int64]:
-    numbers = np.round(multiples)
-    if not np.abs(numbers).max(initial=0.0) < MOST_STEPS:
-        raise InputError(f"The step {step:.3g} is too small for this map; choose a larger one.")
-    return numbers.astype(np.int64)

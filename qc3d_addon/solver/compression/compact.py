@@ -31,7 +31,7 @@ _DIGEST = 2  # bytes
 _FLOAT, _CHECKSUM = struct.Struct("<f"), struct.Struct("<I")
 _MOST_BITS = 40  # of factors
 _MOST_SETTINGS = 4096
-_HAS_FACTORS, _IS_REMADE = 1 << 5, 1 << 3
+_HAS_FACTORS, _IS_REMADE, _IS_UNFOLDED = 1 << 5, 1 << 3, 1 << 4
 # The modes of two machines differ by rounding, or by far more than this share of a step.
 _CHECK_SHARE, _CHECK_ROUNDING = 0.02, 1e-6
 _DAMAGED = "The compressed data is damaged: its header makes no sense."
@@ -75,6 +75,8 @@ class Packed:
     exact : (F, b, 3), optional
         The places of the boundary's vertices, where they are exact.
     remaking : Remaking, optional
+    is_unfolded : bool
+        Whether maps are to be unfolded once they are restored.
     """
 
     kind: Kind
@@ -83,6 +85,7 @@ class Packed:
     field: Field
     exact: Floats | None = None
     remaking: Remaking | None = None
+    is_unfolded: bool = False
 
 
 def is_compact(data: bytes) -> bool:
@@ -104,7 +107,7 @@ def space_of(source: Source, boundary: Boundary) -> Space:
 def to_bytes(source: Source, space: Space, packed: Packed) -> bytes:
     """The file of displacements of a source."""
     flags = KINDS_OF_SOURCES.index(packed.kind) | _BOUNDARIES.index(packed.boundary) << 1
-    flags |= 0 if packed.remaking is None else _IS_REMADE
+    flags |= (0 if packed.remaking is None else _IS_REMADE) | (_IS_UNFOLDED if packed.is_unfolded else 0)
     head = _MAGIC + source.digest[:_DIGEST] + bytes([flags]) + _varint(packed.count)
     blocks = []
     if packed.exact is not None:
@@ -134,8 +137,9 @@ def from_bytes(data: bytes, source: Source, most_keys: int = 64) -> tuple[Packed
         raise InputError("The compressed data is damaged: the checksum is wrong.")
     reader = _Reader(data[4:-4])
     digest, flags, count = reader.take(_DIGEST), reader.take(1)[0], reader.varint()
-    kind, number, rest = KINDS_OF_SOURCES[flags & 1], flags >> 1 & 3, flags >> 4
-    if number >= len(_BOUNDARIES) or rest or (kind == "frames" and number) or (kind == "maps" and flags & _IS_REMADE):
+    kind, number, rest = KINDS_OF_SOURCES[flags & 1], flags >> 1 & 3, flags >> 5
+    of_the_other = _IS_REMADE if kind == "maps" else _IS_UNFOLDED
+    if number >= len(_BOUNDARIES) or rest or (kind == "frames" and number) or flags & of_the_other:
         raise InputError(_DAMAGED)
     if kind != source.kind:
         raise InputError(f"The file holds {kind}; give what these belong to.")
@@ -160,7 +164,7 @@ def from_bytes(data: bytes, source: Source, most_keys: int = 64) -> tuple[Packed
         field = _read_field(block, space, None, most_keys)
         remaking = Remaking(settings, field, error, check)
     field = _read_field(reader, space, count, count)
-    return Packed(kind, boundary, count, field, exact, remaking), space
+    return Packed(kind, boundary, count, field, exact, remaking, bool(flags & _IS_UNFOLDED)), space
 
 
 def _field_bytes(space: Space, field: Field) -> bytes:

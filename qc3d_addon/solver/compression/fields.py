@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
-from .graph_modes import MOST_MODES, MOST_VERTICES, graph_modes, laplacian
+from .graph_modes import MOST_IN_VOLUME, MOST_MODES, MOST_ON_SURFACE, graph_modes, laplacian
 from .hierarchy import Hierarchy
 
 Kind = Literal["plain", "levels", "modes"]
@@ -59,7 +59,13 @@ class Space:
     def most_modes(self) -> int:
         """How many modes there may be: none where they would take minutes."""
         count = len(self.points)
-        return 0 if count > MOST_VERTICES else min(MOST_MODES, count // 4)
+        most = MOST_ON_SURFACE if self.is_surface else MOST_IN_VOLUME
+        return 0 if count > most else min(MOST_MODES, count // 4)
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the cells are triangles."""
+        return bool(self._cells.shape[1] == 3)
 
     def modes(self, count: int) -> tuple[Floats, ...]:
         """For each coordinate (n, k) modes that are 0 where it is known; k is at most ``count``."""

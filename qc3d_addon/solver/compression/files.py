@@ -24,7 +24,7 @@ from ..errors import InputError
 from ..files.npz import require_file, unreadable
 from ..support.memory import require_memory_for_frames
 from ..tets.mesh import TetMesh
-from .codec import Boundary, Compressed, Scheme
+from .compressed import Boundary, Compressed, Scheme
 from .entropy import decoded
 from .integers import inflated, packed, planes, unpacked
 from .prediction import Predictor

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import InputError
 from ..maps.mapping import Mapping
+from ..maps.unfolding import unfolded
+from ..support.progress import told
 from ..tets.mesh import TetMesh
 from .compact import Boundary, Packed, from_bytes, space_of, to_bytes
 from .fields import Space
@@ -25,6 +28,7 @@ _MOST_ERROR, _LEAST_ERROR = 1.0, 1e-9
 _TRIALS_OF_SIZE = 9
 _FULL = 0.98  # of the size is near enough
 _TRIALS_WITHOUT_FOLDS, _NEARER = 12, 0.7
+_TRIES_TO_UNFOLD, _NEARER_TO_UNFOLD = 3, 0.97
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,8 @@ class Small:
         Root mean square distance of what comes back, over the diagonal of the mesh's bounding box.
     folds : tuple of int
         Folded tetrahedra of each map; empty for frames.
+    is_unfolded : bool
+        Whether the reader has to unfold maps.
     """
 
     data: bytes
@@ -50,6 +56,7 @@ class Small:
     restored: Floats
     errors: Floats
     folds: tuple[int, ...] = ()
+    is_unfolded: bool = False
 
     @property
     def error(self) -> float:
@@ -85,12 +92,40 @@ def small_maps(mesh: TetMesh, targets: Floats, error: float, boundary: ChosenBou
     chosen: Boundary = boundary if boundary != "auto" else "sliding" if stays else "fixed"
     space, unit = space_of(source, chosen), diagonal_of(mesh.points)
     exact = np.array(targets[:, source.boundary]) if chosen == "exact" else None
-    wanted = Wanted(space, (targets - mesh.points) * space.free, unit, error)
-    field = yield from smallest(wanted)
-    data = to_bytes(source, space, Packed("maps", chosen, len(targets), field, exact))
+    moved, asked = (targets - mesh.points) * space.free, error
+    # What was folded before is not to be unfolded.
+    tries = 1 if any(Mapping(mesh, values).folds for values in targets) else _TRIES_TO_UNFOLD
+    found: list[Small] = []
+    for number in range(tries):
+        start = 1.0 - 0.5**number  # each further try takes as long, and is less likely
+        field = yield from told(
+            smallest(Wanted(space, moved, unit, asked)), partial(_between, start, 0.5 * (1.0 + start))
+        )
+        packed = Packed("maps", chosen, len(targets), field, exact)
+        found.append(_small_of(source, space, packed, mesh, targets))
+        if any(found[-1].folds) and tries > 1:
+            found.append(_small_of(source, space, replace(packed, is_unfolded=True), mesh, targets))
+        if any(found[-1].folds):
+            break  # it cannot be unfolded
+        if not found[-1].is_unfolded or found[-1].error <= error:
+            yield 1.0
+            return found[-1]
+        # Unfolding has led farther away than was asked; it starts nearer now.
+        asked *= _NEARER_TO_UNFOLD * error / found[-1].error
+    yield 1.0
+    return found[0]
+
+
+def _between(start: float, end: float, share: float) -> float:
+    return start + share * (end - start)
+
+
+def _small_of(source: Source, space: Space, packed: Packed, mesh: TetMesh, targets: Floats) -> Small:
+    data = to_bytes(source, space, packed)
     restored = unpacked(data, source)
     folds = tuple(Mapping(mesh, values).folds for values in restored)
-    return Small(data, field.part.kind, restored, errors_of(restored, targets, unit), folds)
+    errors = errors_of(restored, targets, diagonal_of(mesh.points))
+    return Small(data, packed.field.part.kind, restored, errors, folds, packed.is_unfolded)
 
 
 def small_frames(frames: Floats, faces: Ints, error: float) -> Work:
@@ -119,6 +154,8 @@ def unpacked(data: bytes, source: Source) -> Floats:
     restored = source.points + packed.field.displacements(space)
     if packed.exact is not None:
         restored[:, source.boundary] = packed.exact
+    if packed.is_unfolded:
+        restored = np.stack([unfolded(source.mesh, values, space.free) for values in restored])
     return np.asarray(restored)
 
 

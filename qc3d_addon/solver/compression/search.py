@@ -13,7 +13,8 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InputError, ReconstructionError
 from ..maps.mapping import Mapping
-from .codec import Codec, Compressed
+from .codec import Codec
+from .compressed import Compressed
 from .files import Packer, plain_bytes
 
 # Modes and steps that searches choose from.

@@ -13,7 +13,8 @@ from ..maps.boundary_conditions import Conditions
 from ..maps.mapping import Mapping
 from ..maps.reconstruction import reconstruct
 from ..maps.representation import from_upper_triangle, upper_triangle
-from .codec import Scheme, exponential, logarithm
+from .compressed import Scheme
+from .logarithms import exponential, logarithm
 from .modes import Transfer
 
 _ITERATIONS = 300

@@ -36,8 +36,10 @@ _MOST_HEADER = 2**14  # bytes of an array's header; numpy itself reads at most 1
 _LEAST_HELD = 8  # bytes counted for each number: most arrays are converted to double precision
 
 
-def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:
-    """Write arrays to an .npz file. Unlike ``np.savez``, an error leaves no open file and no warning behind.
+def write_arrays(path: Path | BinaryIO, arrays: Mapping[str, NDArray[Any]], is_compressed: bool = True) -> None:
+    """Write arrays to an .npz file, or to an open one.
+
+    Unlike ``np.savez``, an error leaves no open file and no warning behind.
 
     Raises
     ------

@@ -67,11 +67,8 @@ def to_bytes(fitted: FittedMap) -> bytes:
         "cube": None if cube is None else {name: np.asarray(getattr(cube, name)).tolist() for name in _CUBE},
     }
     buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer,
-        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
-        **arrays_of(mesh, fitted.maps, fitted.turns),
-    )
+    arrays: dict[str, Any] = dict(arrays_of(mesh, fitted.maps, fitted.turns))
+    np.savez_compressed(buffer, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), **arrays)
     return _seal(buffer.getvalue()) + buffer.getvalue()
 
 

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 QC3D authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a frame stands: its calm parts beside the straight lines between the keys.
+"""Where a frame stands: its calm parts beside the straight lines between the keys, or all of it beside a course.
 
 Lengths, turns and volumes tell a frame's shape and leave its place to weak anchors, so that where nothing is still the
-whole frame would drift. It is carried rigidly to where the vertices that travel least go straight.
+whole frame would drift. It is carried rigidly to where the vertices that travel least go straight. In a chain, the
+keys before and after tell more: as far as a frame follows its course, it is carried to where it is nearest to that.
 """
 
 from __future__ import annotations
@@ -17,7 +18,11 @@ from ..arrays import Floats
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotations import rotation_matrices, rotation_vectors
+<<<<<<< HEAD
 from ..surface.path import SurfacePath
+=======
+from .course import Course
+>>>>>>> main
 
 # Vertices that travel less than this part of all count most.
 _CALM_PERCENTILE = 25.0
@@ -112,8 +117,14 @@ class CalmAlignment:
         self._embedding = embedding
         self._inner = (False, False)
         self._part = 0.0 if turns else _calm_part(embedding)
+<<<<<<< HEAD
         self._weights = _calm_weights(embedding.travel, embedding.weights)
         self._turning = _turning_part(surface, self._weights)
+=======
+        self._course: Course | None = None
+        self._led = 0.0
+        self._weights = _weights(_calmness(embedding.travel), embedding)
+>>>>>>> main
 
     def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
@@ -121,12 +132,29 @@ class CalmAlignment:
         other._inner = inner
         return other
 
+    def along(self, course: Course) -> CalmAlignment:
+        """The same for a pair of a chain that follows a course, as far as that is followed."""
+        other = copy.copy(self)
+        areas = self._embedding.weights / self._embedding.weights.sum()
+        other._course, other._led = course, float(areas @ course.share)
+        calm = (1.0 - other._led) * _calmness(self._embedding.travel)
+        other._weights = _weights(calm + other._led * course.share, self._embedding)
+        return other
+
     def of(self, shape: Floats, time: float) -> RigidMove:
         """Where to carry a shape (n, 3) at ``time``, cube units."""
         if not self._part:
             return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
+<<<<<<< HEAD
         whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
         return whole.scaled(self._part * self.onset(time), self._turning)
+=======
+        target = self._embedding.straight(time)
+        if self._course is not None:
+            target = self._course.lead(target, self._embedding, time)
+        whole = RigidMove.between(shape, target, self._weights)
+        return whole.scaled(self._part * (self._led + (1.0 - self._led) * self.onset(time)))
+>>>>>>> main
 
     def onset(self, time: float) -> float:
         """The part of a move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
@@ -148,6 +176,7 @@ def _calm_part(embedding: Embedding) -> float:
     return part * part * (3.0 - 2.0 * part)
 
 
+<<<<<<< HEAD
 def _turning_part(surface: SurfacePath, weights: Floats) -> float:
     """How much of a rotation is due, 0..1, by how far what is calm, of weights (n,), turns between the keys."""
     deformation, turning = surface.deformation, surface.turning
@@ -169,8 +198,16 @@ def _calm_weights(travel: Floats, areas: Floats) -> Floats:
     areas : (n,)
         Positive.
     """
+=======
+def _calmness(travel: Floats) -> Floats:
+    """(n,) in 0..1: most for the vertices that travel least; ``travel`` (n,) is relative to the size."""
+>>>>>>> main
     reach = float(np.percentile(travel, _CALM_PERCENTILE))
-    weights = np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2))
-    weights += (NEARLY_STILL / np.maximum(travel, STILL_TOLERANCE)) ** 4
-    weights *= areas
+    return np.asarray(np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2)))
+
+
+def _weights(calmness: Floats, embedding: Embedding) -> Floats:
+    """(n,) weights with sum 1: still vertices before all, then those with the most ``calmness`` (n,)."""
+    still = (NEARLY_STILL / np.maximum(embedding.travel, STILL_TOLERANCE)) ** 4
+    weights = (calmness + still) * embedding.weights
     return np.asarray(weights / weights.sum())

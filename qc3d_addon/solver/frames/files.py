@@ -10,15 +10,23 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Floats
+from ..collision.colliders import Collider
 from ..files.npz import write_arrays
 from ..keys.keypair import KeyPair
 
 
-def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Floats, settings: str = "") -> None:
+def write_frames(
+    path: Path,
+    pairs: Sequence[KeyPair],
+    times: Floats,
+    frames: Floats,
+    settings: str = "",
+    collider: Collider | None = None,
+) -> None:
     """Write frames (k, n, 3) at ``times`` (k,) with the faces, the first and the last key of the pairs, compressed.
 
-    With the ``settings`` of the bake, and the polygons of the triangles where some have several, the frames can be made
-    again; see ``frames.remade``.
+    With the ``settings`` of the bake, its ``collider``, and the polygons of the triangles where some have several, the
+    frames can be made again; see ``frames.remade``.
 
     Raises
     ------
@@ -32,4 +40,6 @@ def write_frames(path: Path, pairs: Sequence[KeyPair], times: Floats, frames: Fl
         arrays["settings"] = np.array(settings)
         if len(np.unique(own[0].polygons)) < len(own[0].faces):
             arrays["polygons"] = own[0].polygons
+        if collider is not None:
+            arrays |= {"collider": collider.shapes, "collider_faces": collider.faces}
     write_arrays(path, arrays)

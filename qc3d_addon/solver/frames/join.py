@@ -4,8 +4,9 @@
 
 At an inner key, both adjacent pairs get the mean of their rates over the time that both take: angular velocities and
 strain rates of the triangles, and growth rates of the volumes. This keeps lengths, and, since no rate exceeds what the
-two pairs have together, a short pair beside a long one does not make the motion overshoot. The small differences that
-remain between the velocities of the vertices are removed by displacing the vertices themselves.
+two pairs have together, a short pair beside a long one does not make the motion overshoot. All pairs are drawn to one
+course through all keys, which tells where parts are and when. The small differences that remain between the velocities
+of the vertices are removed by displacing the vertices themselves.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..surface.end_rates import Rates
+from .course import courses
 from .natural import NaturalFrames
-
-_VELOCITY_STEP = 0.02  # of a pair's time: second-order differences are accurate enough, and rounding is negligible
+from .volume_anchors import VELOCITY_STEP, end_velocity
 
 
 def join(makers: Sequence[NaturalFrames], durations: Floats) -> list[NaturalFrames]:
@@ -44,6 +45,10 @@ def join(makers: Sequence[NaturalFrames], durations: Floats) -> list[NaturalFram
         maker.with_end_rates(first, second, (number > 0, number < last))
         for number, (maker, (first, second)) in enumerate(zip(makers, rates, strict=True))
     ]
+    keys = np.stack([maker.key(0) for maker in makers] + [makers[-1].key(1)])
+    shares_of_course = [maker.course_share() for maker in makers]
+    along = courses(keys, durations, [maker.still for maker in makers], shares_of_course)
+    joined = [maker.along(course) for maker, course in zip(joined, along, strict=True)]
     velocities = [[_velocity(maker, end) for end in (0, 1)] for maker in joined]
     slopes = [[np.zeros_like(velocity) for velocity in ends] for ends in velocities]
     for left in range(len(joined) - 1):
@@ -78,6 +83,5 @@ def _shared_rates(
 
 def _velocity(maker: NaturalFrames, end: int) -> Floats:
     """(n, 3) velocities at the first (0) or second (1) key, by one-sided differences of second order."""
-    near, far = (maker.shape(abs(end - step * _VELOCITY_STEP)) for step in (1, 2))
-    outward = (4.0 * near - far - 3.0 * maker.key(end)) / (2.0 * _VELOCITY_STEP)
-    return np.asarray(outward if end == 0 else -outward)
+    near, far = (maker.shape(abs(end - step * VELOCITY_STEP)) for step in (1, 2))
+    return end_velocity(near, far, maker.key(end), end)

@@ -19,14 +19,17 @@ from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SWEEPS, SurfacePath
 from .alignment import CalmAlignment, RigidMove
+from .course import Course, shares_of_turns
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
 from .mirror_image import MirrorImages
 from .straighter import Straighter, more_than
+from .volume_anchors import VolumeAnchors
 from .volume_path import VolumePath, turning_inside
 
 _UNCROSSING_ATTEMPTS = 3
+_HASTE = (2, 8, 8)  # of each: first nearer to the course of a chain, then nearer to the volume
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
@@ -55,14 +58,19 @@ class NaturalFrames:
             self._volume = VolumePath(fitted.volume.system, fitted.maps, turning, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
+<<<<<<< HEAD
         self._alignment = CalmAlignment(embedding, self._surface, turns)
         self._missed = [
             key - fitted.landmarks @ self._volume.at(time)
             for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
         ]
+=======
+        self._alignment = CalmAlignment(embedding, turns)
+        self._anchors = VolumeAnchors(fitted, self._volume)
+>>>>>>> main
         self._mirror_images = MirrorImages(fitted.pair)
         if self._mirror_images:
-            moment = self._moments([self._volume.at(0.5)], [0.5])
+            moment = self._anchors.of([self._volume.at(0.5)], [0.5])
             halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
             self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
 
@@ -115,6 +123,23 @@ class NaturalFrames:
         changed._alignment = self._alignment.beside(inner)
         return changed
 
+    def course_share(self) -> Floats:
+        """(n,) how much the vertices may follow the course of a chain, 0..1; not at all with extra turns."""
+        if self._turns:
+            return np.zeros(len(self.still))
+        deformation, count = self._surface.deformation, len(self.still)
+        spins = [rates.spin for rates in self.end_rates()]
+        angles = np.linalg.norm(0.5 * (spins[0] + spins[1]), axis=1)
+        corners = self._fitted.pair.covering[0][self.rows]
+        return shares_of_turns(angles, deformation.weights, corners, count)
+
+    def along(self, course: Course) -> NaturalFrames:
+        """The same in-betweens, drawn to the course of the chain that they are part of."""
+        led = copy.copy(self)
+        led._anchors, led._alignment = self._anchors.along(course), self._alignment.along(course)
+        led._surface = self._surface.with_stronger_anchors(course.strength)
+        return led
+
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:
         """The same in-betweens with velocities (n, 3) added at the two keys."""
         changed = copy.copy(self)
@@ -123,7 +148,7 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
-        shape = self._shaped(self._surface, self._moments([self._volume.at(time)], [time]))[0]
+        shape = self._shaped(self._surface, self._anchors.of([self._volume.at(time)], [time]))[0]
         return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
@@ -179,7 +204,7 @@ class NaturalFrames:
         maps = self._volume.maps_at(times)
         at_keys = times[0] in (0.0, 1.0)
         sweeps = _SWEEPS_AT_KEYS if at_keys else SWEEPS
-        shapes = self._shaped(self._surface, self._moments(maps, times), sweeps)
+        shapes = self._shaped(self._surface, self._anchors.of(maps, times), sweeps)
         return maps, shapes, [0 if at_keys else self._limit.excess(shape) for shape in shapes]
 
     def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
@@ -214,14 +239,6 @@ class NaturalFrames:
         few = batches(moments, surface.shapes_at_once)
         return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
 
-    def _moments(self, maps: Sequence[Floats] | Floats, times: Sequence[float]) -> list[tuple[float, Floats]]:
-        """Times, each with the landmarks (n, 3) of its map, what maps miss at the two keys blended in."""
-        landmarks, missed = self._fitted.landmarks, self._missed
-        return [
-            (time, np.asarray(landmarks @ values + (1.0 - time) * missed[0] + time * missed[1]))
-            for values, time in zip(maps, times, strict=True)
-        ]
-
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
     ) -> Generator[float, None, tuple[list[Floats], list[int | None]]]:
@@ -253,9 +270,12 @@ class NaturalFrames:
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            tried = self._all_shaped(surface, self._moments(volumes, times.tolist()))
+            anchored = self._anchors.aside(volumes, times.tolist(), reach, _HASTE[attempt])
+            tried = self._all_shaped(surface, anchored)
             remaining = list(in_threads(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
+                if attempt == 0 and self._anchors.is_led:
+                    continue
                 break
             positions, excess = tried, remaining
         return positions, excess
@@ -309,7 +329,7 @@ class NaturalFrames:
             for near in nearby:
                 reach = np.maximum(reach, self._limit.faded(near))
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
-            anchored = self._moments(volumes, moments)
+            anchored = self._anchors.of(volumes, moments)
             positions = self._all_shaped(
                 surface,
                 [

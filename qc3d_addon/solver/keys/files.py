@@ -19,6 +19,8 @@ from ..support.memory import estimated_mb, machine_limit_mb, require_memory
 from ..triangles.polygons import labels_by_sides
 from .keypair import Ends, KeyPair, consecutive_pairs
 
+NEEDED = "faces, shape_names and V0, V1, ... are needed"
+
 
 def read_pairs(
     path: Path,
@@ -76,21 +78,37 @@ def read_shapes(
 
     See ``read_pairs``; memory is checked for so many ``pairs``.
     """
-    with open_archive(path, "faces, shape_names and V0, V1, ... are needed") as archive:
-        known = _shape_names(archive, path)
-        for name in names:
-            if name not in known:
-                raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
-        arrays = {name: f"V{known.index(name)}" for name in names}
-        polygons = ["polygons"] if "polygons" in archive else []
-        headers = archive.headers(["faces", *polygons, *dict.fromkeys(arrays.values())])
-        for name, array in arrays.items():
-            _require_coordinates(headers[array], name, path)
-        vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
-        needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
-        if limit := machine_limit_mb():
-            require_memory(needed, limit, vertices)
-        found = archive.read(headers)
+    with open_archive(path, NEEDED) as archive:
+        return shapes_in(
+            archive, path, names, pairs=pairs, frames=frames, quality=quality, needs_fits=needs_fits
+        )
+
+
+def shapes_in(
+    archive: Archive,
+    path: Path,
+    names: Sequence[str],
+    *,
+    pairs: int = 0,
+    frames: int = 0,
+    quality: Quality = "normal",
+    needs_fits: bool = True,
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any], NDArray[Any] | None]:
+    """What ``read_shapes`` reads, from an archive that is open; ``path`` is for error messages."""
+    known = _shape_names(archive, path)
+    for name in names:
+        if name not in known:
+            raise InputError(f"{path} has no shape {name!r}; it has {', '.join(map(repr, known)) or 'none'}.")
+    arrays = {name: f"V{known.index(name)}" for name in names}
+    polygons = ["polygons"] if "polygons" in archive else []
+    headers = archive.headers(["faces", *polygons, *dict.fromkeys(arrays.values())])
+    for name, array in arrays.items():
+        _require_coordinates(headers[array], name, path)
+    vertices, triangles = (max(headers[name].rows for name in group) for group in (arrays.values(), ["faces"]))
+    needed = estimated_mb(vertices, pairs, frames, quality, needs_fits, triangles)
+    if limit := machine_limit_mb():
+        require_memory(needed, limit, vertices)
+    found = archive.read(headers)
     labels = polygon_labels(found["polygons"], found["faces"]) if polygons else None
     return {name: found[array] for name, array in arrays.items()}, found["faces"], labels
 

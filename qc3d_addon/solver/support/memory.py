@@ -23,6 +23,7 @@ _MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only 
 _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress
 _KB_PER_FRAME, _BYTES_PER_COMPRESSED = 5.0, 220.0
 _BYTES_OF_FACTORS = 600.0  # for each vertex to the power 4/3, as for the factors of a three-dimensional mesh
+_BYTES_OF_SURFACE_FACTORS = 1600.0  # for each vertex of a surface, measured with 110,000
 _KB_OF_MATRICES, _BLOCKS = 1.0, 6  # for each vertex; blocks of vectors and directions that are held at once
 _KB_OF_NEIGHBORS, _VECTORS_PER_MODE = 1.0, 5  # for each vertex; of all three coordinates, and while they are computed
 _SHARE_OF_MACHINE = 0.75  # leaves a quarter for Blender and the system
@@ -148,7 +149,7 @@ def require_memory_for_frames(frames: int, vertices: int) -> None:
     _require(needed, f"Work on {frames} frames of {vertices} vertices", "use fewer frames or a coarser mesh")
 
 
-def compression_mb(vertices: int, frames: int, modes: int) -> float:
+def compression_mb(vertices: int, frames: int, modes: int, is_surface: bool = False) -> float:
     """Estimated peak memory, in megabytes, of the search for the smallest file.
 
     Parameters
@@ -157,15 +158,18 @@ def compression_mb(vertices: int, frames: int, modes: int) -> float:
         Of what is compressed.
     modes
         How many modes of the mesh are tried.
+    is_surface
+        Whether the mesh is a surface, whose factored matrix is small.
     """
     needed = _MB_OF_A_COMMAND + frames * (_KB_PER_FRAME / 1e3 + vertices * _BYTES_PER_COMPRESSED / 1e6)
     needed += vertices * (_KB_OF_NEIGHBORS / 1e3 + 8.0 * _VECTORS_PER_MODE * modes / 1e6)
-    return needed + (_BYTES_OF_FACTORS * vertices ** (4 / 3) / 1e6 if modes else 0.0)
+    factors = _BYTES_OF_SURFACE_FACTORS * vertices if is_surface else _BYTES_OF_FACTORS * vertices ** (4 / 3)
+    return needed + (factors / 1e6 if modes else 0.0)
 
 
-def require_memory_for_compression(vertices: int, frames: int, modes: int) -> None:
+def require_memory_for_compression(vertices: int, frames: int, modes: int, is_surface: bool = False) -> None:
     """Raise InputError, before the search starts, if three quarters of the machine's memory would not be enough."""
-    needed = compression_mb(vertices, frames, modes)
+    needed = compression_mb(vertices, frames, modes, is_surface)
     _require(needed, f"Compressing {frames} times {vertices} vertices", "use fewer frames or a coarser mesh")
 
 

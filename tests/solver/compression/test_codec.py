@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.compression import search as rate
-from qc3d_addon.solver.compression.codec import Codec, Compressed, Scheme
+from qc3d_addon.solver.compression.codec import Codec
+from qc3d_addon.solver.compression.compressed import Compressed, Scheme
 from qc3d_addon.solver.compression.files import Packer, Source
 from qc3d_addon.solver.compression.search import Compressor
 from qc3d_addon.solver.compression.transfer_loss import transferred

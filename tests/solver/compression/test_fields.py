@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.compression.fields import GROWTHS, Part, Space, analyzed, synthesized
-from qc3d_addon.solver.compression.graph_modes import graph_modes, laplacian
+from qc3d_addon.solver.compression.graph_modes import (
+    MOST_IN_VOLUME,
+    MOST_MODES,
+    MOST_ON_SURFACE,
+    graph_modes,
+    laplacian,
+)
 from qc3d_addon.solver.compression.hierarchy import Hierarchy
 
 from ..meshes import icosphere, jittered_grid
@@ -61,6 +67,13 @@ class TestModes:
         for coordinate, modes in enumerate(space.modes(20)):
             np.testing.assert_allclose(modes.T @ modes, np.eye(20), atol=1e-9)
             assert not modes[MESH.on_cube_face[:, coordinate]].any()
+
+    def test_large_surfaces_have_them_and_large_volumes_do_not(self) -> None:
+        points = np.zeros((MOST_IN_VOLUME + 1, 3))
+        surface, volume = (Space(points, np.arange(corners)[None]) for corners in (3, 4))
+        assert (surface.most_modes, volume.most_modes) == (MOST_MODES, 0)
+        assert Space(points[:-1], np.arange(4)[None]).most_modes == MOST_MODES
+        assert Space(np.zeros((MOST_ON_SURFACE + 1, 3)), np.arange(3)[None]).most_modes == 0
 
     def test_two_equal_parts_have_modes_of_their_own(self) -> None:
         points, faces = icosphere(2)

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.compression import files as compressed_files
-from qc3d_addon.solver.compression.codec import Compressed
+from qc3d_addon.solver.compression.compressed import Compressed
 from qc3d_addon.solver.compression.files import Content, Source, from_bytes, read_bytes, to_bytes
 from qc3d_addon.solver.errors import InputError
 

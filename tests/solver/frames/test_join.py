@@ -83,7 +83,7 @@ def test_a_chain_that_goes_on_does_not_stop(bending: list[FittedMap]) -> None:
     assert middle > min(traveled)
 
 
-@pytest.mark.parametrize(("chain", "part"), [("bending", 0.05), ("turning_over", 0.3)])
+@pytest.mark.parametrize(("chain", "part"), [("bending", 0.1), ("turning_over", 0.3)])
 def test_lengths_hold_along_the_chain(chain: str, part: float, request: pytest.FixtureRequest) -> None:
     parts = request.getfixturevalue(chain)
     edges = unique_edges(sides(FACES))

@@ -18,11 +18,8 @@ from ..arrays import Floats
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotations import rotation_matrices, rotation_vectors
-<<<<<<< HEAD
 from ..surface.path import SurfacePath
-=======
 from .course import Course
->>>>>>> main
 
 # Vertices that travel less than this part of all count most.
 _CALM_PERCENTILE = 25.0
@@ -117,14 +114,10 @@ class CalmAlignment:
         self._embedding = embedding
         self._inner = (False, False)
         self._part = 0.0 if turns else _calm_part(embedding)
-<<<<<<< HEAD
-        self._weights = _calm_weights(embedding.travel, embedding.weights)
-        self._turning = _turning_part(surface, self._weights)
-=======
         self._course: Course | None = None
         self._led = 0.0
         self._weights = _weights(_calmness(embedding.travel), embedding)
->>>>>>> main
+        self._turning = _turning_part(surface, self._weights)
 
     def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
@@ -145,16 +138,12 @@ class CalmAlignment:
         """Where to carry a shape (n, 3) at ``time``, cube units."""
         if not self._part:
             return RigidMove(np.zeros(3), np.zeros(3), np.zeros(3))
-<<<<<<< HEAD
-        whole = RigidMove.between(shape, self._embedding.straight(time), self._weights)
-        return whole.scaled(self._part * self.onset(time), self._turning)
-=======
         target = self._embedding.straight(time)
         if self._course is not None:
             target = self._course.lead(target, self._embedding, time)
         whole = RigidMove.between(shape, target, self._weights)
-        return whole.scaled(self._part * (self._led + (1.0 - self._led) * self.onset(time)))
->>>>>>> main
+        onset, turning = (self._led + (1.0 - self._led) * part for part in (self.onset(time), self._turning))
+        return whole.scaled(self._part * onset, turning)
 
     def onset(self, time: float) -> float:
         """The part of a move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
@@ -176,7 +165,6 @@ def _calm_part(embedding: Embedding) -> float:
     return part * part * (3.0 - 2.0 * part)
 
 
-<<<<<<< HEAD
 def _turning_part(surface: SurfacePath, weights: Floats) -> float:
     """How much of a rotation is due, 0..1, by how far what is calm, of weights (n,), turns between the keys."""
     deformation, turning = surface.deformation, surface.turning
@@ -188,20 +176,8 @@ def _turning_part(surface: SurfacePath, weights: Floats) -> float:
     return float(part * part * (3.0 - 2.0 * part))
 
 
-def _calm_weights(travel: Floats, areas: Floats) -> Floats:
-    """(n,) weights with sum 1: still vertices before all, then those that travel least.
-
-    Parameters
-    ----------
-    travel : (n,)
-        Distances between the keys over the size of the first.
-    areas : (n,)
-        Positive.
-    """
-=======
 def _calmness(travel: Floats) -> Floats:
     """(n,) in 0..1: most for the vertices that travel least; ``travel`` (n,) is relative to the size."""
->>>>>>> main
     reach = float(np.percentile(travel, _CALM_PERCENTILE))
     return np.asarray(np.exp(-(np.minimum(travel / max(reach, 1e-300), 1e2) ** 2)))
 

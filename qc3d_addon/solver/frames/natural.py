@@ -58,16 +58,8 @@ class NaturalFrames:
             self._volume = VolumePath(fitted.volume.system, fitted.maps, turning, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
-<<<<<<< HEAD
         self._alignment = CalmAlignment(embedding, self._surface, turns)
-        self._missed = [
-            key - fitted.landmarks @ self._volume.at(time)
-            for time, key in ((0.0, embedding.key0), (1.0, embedding.key1))
-        ]
-=======
-        self._alignment = CalmAlignment(embedding, turns)
         self._anchors = VolumeAnchors(fitted, self._volume)
->>>>>>> main
         self._mirror_images = MirrorImages(fitted.pair)
         if self._mirror_images:
             moment = self._anchors.of([self._volume.at(0.5)], [0.5])

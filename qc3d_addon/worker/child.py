@@ -92,10 +92,11 @@ class Child:
             return False
         return True
 
-    def put_away(self) -> None:
-        """Remove the folder of a job that has ended."""
+    def put_away(self) -> bool:
+        """Remove the folder of a job that has ended; returns whether it is gone, so that another job can come."""
         shutil.rmtree(self.job, ignore_errors=True)
         self.idle_since = clock.monotonic()
+        return not self.job.exists()
 
     def has_ended(self) -> bool:
         """Whether it has ended; what it had started has then ended as well, and all that it said is in the inbox."""

@@ -190,11 +190,11 @@ class Worker(Generic[Result]):
         if self._is_closed:
             return
         self._is_closed = True
-        if self._standby is None or self._inbox.ending is None or self._inbox.is_garbled or self._is_spoiled:
-            self._child.close()
-        else:
-            self._child.put_away()
+        is_sound = self._inbox.ending is not None and not self._inbox.is_garbled and not self._is_spoiled
+        if self._standby is not None and is_sound and self._child.put_away():
             self._standby.keep(self._child)
+        else:
+            self._child.close()
 
     def _begun(self) -> Child:
         """The child that does the job: the one that was kept, if it can still be told, or else a new one."""

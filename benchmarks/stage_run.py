@@ -64,11 +64,11 @@ def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
     imported = clock.perf_counter() - started
     faces, key0, key1 = stage_cases.load(case)
     options = FitOptions(engine=engine)
-    started = clock.perf_counter()
+    started, used = clock.perf_counter(), clock.process_time()
     pair = KeyPair.checked(key0, key1, faces)
     fitted = finish(fit_pair(pair, options))
     bake = Fit(fitted).inbetweens(evenly_spaced(count))
-    cold = clock.perf_counter() - started
+    cold, used = clock.perf_counter() - started, clock.process_time() - used
     seconds: dict[str, float] = dict(bake.report.seconds)
     warm = _fastest(lambda: Fit(fitted).inbetweens(evenly_spaced(count)), 2)
     found = {
@@ -77,6 +77,7 @@ def stages(case: str, engine: Engine, count: int, one: bool) -> dict[str, Any]:
         "folds": int(max(one.folds for one in bake.report.certificates)),
         "import": imported,
         "cold": cold,
+        "cold_processor": used,
         "warm": warm,
         **{f"stage_{name}": value for name, value in seconds.items()},
         **(_one_frame(fitted) if one else {}),

@@ -4,6 +4,7 @@
 
     python -m benchmarks.stages                                  # real pairs, both engines, against the yardstick
     python -m benchmarks.stages --growth                         # the limb that a sphere becomes, 1k to 200k vertices
+    python -m benchmarks.stages --small                          # meshes of 8 to 800 vertices
     python -m benchmarks.stages --against HEAD~3 [--cases ...]   # two revisions in turn, ratios by stage
     python -m benchmarks.stages --write                          # the tables of docs/science/speed.md
 
@@ -24,7 +25,7 @@ from typing import Any
 
 from .catalogue import DATA, ROOT
 from .report import table, write_between_markers
-from .stage_cases import LIMITS, SIZES
+from .stage_cases import LIMITS, SIZES, SMALL
 
 DOCUMENT = ROOT / "docs/science/speed.md"
 STAGES = ("mesh", "locate", "path", "fit", "factor", "frames", "measure", "write")
@@ -38,16 +39,18 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--engines", nargs="+", default=["delaunay", "tetwild"])
     parser.add_argument("--frames", type=int, default=24, help="in-betweens (default: 24)")
     parser.add_argument("--growth", action="store_true", help="the limb in all sizes, delaunay engine")
+    parser.add_argument("--small", action="store_true", help="meshes of 8 to 800 vertices of several kinds")
     parser.add_argument("--against", metavar="REVISION", help="compare with another revision, alternating")
     parser.add_argument("--write", action="store_true", help=f"put the table into {DOCUMENT.name}")
     chosen = parser.parse_args(argv)
     if chosen.against:
         compare(chosen.against, chosen.cases, chosen.engines, chosen.frames)
         return
-    text = growth(chosen.frames) if chosen.growth else pairs(chosen)
+    text = growth(chosen.frames) if chosen.growth else small(chosen.frames) if chosen.small else pairs(chosen)
     print(text)
     if chosen.write:
-        write_between_markers(DOCUMENT, text, f"benchmarks/stages.py {'--growth' if chosen.growth else ''}".strip())
+        option = " --growth" if chosen.growth else " --small" if chosen.small else ""
+        write_between_markers(DOCUMENT, text, f"benchmarks/stages.py{option}")
 
 
 def run(case: str, *arguments: object, root: Path = ROOT) -> dict[str, Any]:
@@ -90,6 +93,18 @@ def growth(frames: int) -> str:
         rows.append([f"{size:,}", str(found["tetrahedra"]), *_stage_cells(found), f"{found['cold']:.1f}"])
         rows[-1] += [f"{found['peak_mb']:.0f}", str(found["folds"])]
     return table(["vertices", "tetrahedra", *STAGES, "cold", "MB", "folds"], rows)
+
+
+def small(frames: int) -> str:
+    """The table of small meshes: medians of a few first bakes, each in a process of its own."""
+    rows = []
+    for case in SMALL:
+        runs = [run(case, "delaunay", frames) for _ in range(_ROUNDS)]
+        middle = {name: median(one[name] for one in runs) for name in ("tetrahedra", "cold_processor", "cold")}
+        kind, count = case.split(":")
+        rows.append([kind, count, f"{middle['tetrahedra']:.0f}", f"{middle['cold_processor']:.2f}"])
+        rows[-1] += [f"{middle['cold']:.2f}", f"{max(one['folds'] for one in runs)}"]
+    return table(["kind", "vertices", "tetrahedra", "processor s", "s", "folds"], rows)
 
 
 def compare(revision: str, cases: list[str], engines: list[str], frames: int) -> None:

@@ -129,7 +129,10 @@ def _compress(arguments: argparse.Namespace) -> None:
         f"{report['ratio_to_quantized']:.2f} of quantized ones at the same error; error {result.error:.2g}, folds "
         f"{result.folds}"
     )
-    if result.folds and arguments.error is not None and not is_frames:
+    own_folds = sum(report.get("own_folds", ()))
+    if own_folds:
+        print_notes([f"{own_folds} tetrahedra of the maps are folded themselves, {result.folds} come back folded."])
+    elif result.folds and arguments.error is not None and not is_frames:
         print_notes([f"{result.folds} tetrahedra come back folded; a smaller error or --no-folds avoids that."])
 
 
@@ -186,6 +189,7 @@ def _small_report(small: Small, points: Floats, targets: Floats, mesh: TetMesh |
     }
     if mesh is not None:
         report["unfolded"] = small.is_unfolded
+        report["own_folds"] = [Mapping(mesh, values).folds for values in targets]
         boundary = np.unique(mesh.boundary_faces)
         report["boundary_error"] = np.abs(small.restored - targets)[:, boundary].max(axis=(1, 2)).tolist()
     return report

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from benchmarks import stages
-from benchmarks.stage_cases import limb
+from benchmarks.stage_cases import SMALL, limb, load
 from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
 
 
@@ -30,3 +31,10 @@ def test_every_stage_is_timed() -> None:
     assert 0.0 < found["floor_alone"] < found["one"]
     assert found["folds"] == 0
     assert found["peak_mb"] > 10.0
+
+
+@pytest.mark.parametrize("case", SMALL)
+def test_small_shapes_have_as_many_vertices_as_they_say(case: str) -> None:
+    faces, first, second = load(case)
+    assert len(first) == len(second) == int(case.split(":")[1])
+    assert sorted(set(faces.ravel().tolist())) == list(range(len(first)))

@@ -155,7 +155,9 @@ def test_folds_are_avoided_or_said(tmp_path: Path, capsys: pytest.CaptureFixture
     folded = TetFile(mesh.points, mesh.tets, {TARGET: mesh.points * [-1.0, 1.0, 1.0]})
     write_tets(tmp_path / "map.npz", folded)
     assert main.main(command) == 0
-    assert "tetrahedra come back folded; a smaller error or --no-folds avoids that" in capsys.readouterr().err
+    number = len(mesh.tets)
+    assert f"{number} tetrahedra of the maps are folded themselves, {number} come back folded" in capsys.readouterr().err
+    assert json.loads((tmp_path / "r.json").read_text())["own_folds"] == [number]
 
 
 def test_many_maps(mesh: TetMesh, tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arrays import Bools, Floats
 from ..numerics.assembly import StiffnessPattern
+from ..numerics.conjugate_gradients import conjugate_gradients
 from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
 from .energy_density import derivatives, energy_density, projected_blocks
@@ -132,13 +132,10 @@ class FoldFreeFitter:
         def multiply(vector: Floats) -> Floats:
             return np.asarray(matrix @ (vector * free) * free)
 
-        size = len(free)
-        operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
-        smoother = LinearOperator((size, size), matvec=precondition, dtype=np.float64)
         # Every iterate of CG that starts at zero is a descent direction, also the one at which the iterations run out
-        # (inexact Newton; Nocedal & Wright 2006, section 7.1). The line search judges it, so the status is not needed.
-        step, _ = cg(operator, -gradient.ravel(), rtol=_CG_TOLERANCE, maxiter=_CG_ITERATIONS, M=smoother)
-        return np.asarray(step).reshape(-1, 3)
+        # (inexact Newton; Nocedal & Wright 2006, section 7.1). The line search judges it, however many there were.
+        step, _ = conjugate_gradients(multiply, precondition, -gradient.ravel(), _CG_TOLERANCE, (0, _CG_ITERATIONS))
+        return step.reshape(-1, 3)
 
     def _line_search(
         self, values: Floats, step: Floats, energy: float, slope: float, misfit: Misfit

@@ -66,14 +66,16 @@ class RigidMove:
         shift = weights @ offsets
         # Differences, not positions, go into the moments: they are zero where the target is met, which counts most.
         spread, missing = shape - center, offsets - shift
-        turned, rotation = spread, np.eye(3)
-        floor = _RIDGE * float(weights @ (spread**2).sum(axis=1)) + 1e-300
+        weighted = weights[:, None] * spread
+        spreads, moments = weighted.T @ spread, weighted.T @ missing
+        rotation = np.eye(3)
+        floor = _RIDGE * float(np.trace(spreads)) + 1e-300
         for _ in range(_STEPS):
-            spreads = turned.T @ (weights[:, None] * turned)
-            inertia = (np.trace(spreads) + floor) * np.eye(3) - spreads
-            moment = weights @ np.cross(turned, missing - (turned - spread))
-            step = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0]
-            turned, rotation = turned @ step.T, step @ rotation
+            turned = rotation @ spreads @ rotation.T
+            left = rotation @ (moments + spreads @ (np.eye(3) - rotation.T))
+            inertia = (np.trace(turned) + floor) * np.eye(3) - turned
+            moment = np.array([left[1, 2] - left[2, 1], left[2, 0] - left[0, 2], left[0, 1] - left[1, 0]])
+            rotation = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0] @ rotation
         return cls(rotation_vectors(rotation[None])[0], center, shift)
 
     def scaled(self, part: float, turning: float = 1.0) -> RigidMove:

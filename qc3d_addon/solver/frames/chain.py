@@ -17,7 +17,7 @@ from ..fit.meeting import MET
 from ..keys.halves import held_on_planes
 from ..keys.keypair import KeyPair
 from ..settings import FrameOptions
-from ..support.memory import peak_memory_mb
+from ..support.memory import give_back, peak_memory_mb
 from ..support.progress import Progress, Steps, staged, timed
 from .bake import Bake, checked_times, require_chain
 from .frame import Frame
@@ -25,6 +25,8 @@ from .key_times import KeyTimes
 from .measures import measure, worst_stretch
 from .modes import frame_makers, needs_fits
 from .report import BakeReport, Folds, crossing_notes, embedding_notes, mirror_notes, welding_notes
+
+_MANY = 100_000  # vertices: what was freed while everything was set up is a tenth of the memory
 
 
 def chain_frames(
@@ -63,6 +65,8 @@ def chain_frames(
     with timed(seconds, "factor"):
         makers = yield from staged("factor", frame_makers(pairs, fits, options))
     yield Progress("factor", 1.0)
+    if len(pairs[0].key0) > _MANY:
+        give_back()
     made: dict[int, Frame] = {}
     key_error = 0.0
     with timed(seconds, "frames"):

@@ -69,8 +69,9 @@ def _mean_turns(surface: SurfacePath, labels: Ints) -> Floats:
     deformation = surface.deformation
     owner = labels[surface.vertices[deformation.faces[:, 0]]]
     # As the path has them turn, which may be the long way round; those of parts with a twist are told by the keys.
-    turning = surface.turning
-    turns = np.where(turning.twist.any(axis=1)[:, None], deformation.turns, turning.swing)
+    turns, twisted = surface.turning.swing, surface.turning.twist.any(axis=1)
+    if twisted.any():
+        turns = np.where(twisted[:, None], surface.whole_deformation().turns, turns)
     return means_by_label(owner, turns, deformation.weights, int(labels.max()) + 1)
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 
@@ -15,7 +15,7 @@ from ..arrays import Bools, Floats, Ints
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
-from ..support.threads import batches, beside, in_threads
+from ..support.threads import Item, Result, batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
 from ..surface.path import SWEEPS, SurfacePath
 from .alignment import CalmAlignment, RigidMove
@@ -31,6 +31,7 @@ from .volume_path import VolumePath, turning_inside
 _UNCROSSING_ATTEMPTS = 3
 _HASTE = (2, 8, 8)  # of each: first nearer to the course of a chain, then nearer to the volume
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
+_ONE_BY_ONE = 500_000  # vertices: each frame that is solved beside another takes half a kilobyte for each
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
@@ -152,7 +153,7 @@ class NaturalFrames:
         at_keys = np.isin(times, (0.0, 1.0))
         few = batches(times[~at_keys].tolist(), self._surface.shapes_at_once)
         few += [times[at_keys].tolist()] if at_keys.any() else []
-        for maps, shapes, crossing in in_threads(self._first_try, few):
+        for maps, shapes, crossing in self._side_by_side(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
@@ -229,7 +230,11 @@ class NaturalFrames:
 
     def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
         few = batches(moments, surface.shapes_at_once)
-        return list(chain.from_iterable(in_threads(partial(self._shaped, surface), few)))
+        return list(chain.from_iterable(self._side_by_side(partial(self._shaped, surface), few)))
+
+    def _side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """Results of the work on each item: in threads, or one by one where each takes very much memory."""
+        return map(work, items) if len(self.still) > _ONE_BY_ONE else in_threads(work, items)
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
@@ -261,10 +266,11 @@ class NaturalFrames:
             yield attempt / _UNCROSSING_ATTEMPTS
             for shape in positions:
                 reach = np.maximum(reach, self._limit.faded(self._limit.new_vertices(shape)))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             anchored = self._anchors.aside(volumes, times.tolist(), reach, _HASTE[attempt])
             tried = self._all_shaped(surface, anchored)
-            remaining = list(in_threads(self._limit.excess, tried))
+            remaining = list(self._side_by_side(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
                 if attempt == 0 and self._anchors.is_led:
                     continue
@@ -320,6 +326,7 @@ class NaturalFrames:
                 return pushed
             for near in nearby:
                 reach = np.maximum(reach, self._limit.faded(near))
+            self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             anchored = self._anchors.of(volumes, moments)
             positions = self._all_shaped(

@@ -120,7 +120,10 @@ class Task:
         """Estimated peak memory of the work, in megabytes."""
         pair, quality = next(iter(self.pairs.values())), self.fit_options.quality
         vertices, triangles = len(pair.key0), len(pair.faces)
-        return estimated_mb(vertices, len(self.pairs), self.frame_count, quality, self.needs_fits, triangles)
+        moving = max(float((pair.key0 != pair.key1).any(axis=1).mean()) for pair in self.pairs.values())
+        return estimated_mb(
+            vertices, len(self.pairs), self.frame_count, quality, self.needs_fits, triangles, moving
+        )
 
     def require_memory(self, limit_mb: float) -> None:
         """Raise InputError, before the work starts, if it needs more than ``limit_mb`` megabytes; 0 means no limit."""

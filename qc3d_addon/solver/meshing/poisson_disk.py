@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 from ..settings import Quality
-from ..triangles.geometry import areas
+from ..triangles.geometry import areas, edge_lengths
 from ..triangles.topology import sides, without_piles
 
 SizeField = Callable[[Floats], Floats]
@@ -30,6 +30,7 @@ _NEIGHBORS = 16  # at this oversampling, few candidates have more neighbors insi
 _SHORT_PERCENTILE = 2.0
 _SAMPLES_OF_AN_EDGE = 0.25  # the part of an edge between two samples
 _COARSEST = 2.0
+_COARSEST_OF_FEW = 1.6  # of surfaces of few vertices, which could not follow a finer volume
 _CELLS, _MOST_CELLS = 32, 512  # along an edge of the cube
 _MOST_CANDIDATES = 500_000  # of a surface: where it is folded more densely, further ones would be rejected anyway
 
@@ -44,24 +45,31 @@ class Resolution:
         Cube units.
     slope : float
         Growth per unit of distance from the surface.
+    enough : int
+        Surfaces with fewer vertices than this have coarser samples.
     """
 
     spacing: float
     slope: float
     largest: float
+    enough: int = 0
 
     def scaled(self, size: float) -> Resolution:
         """The same number of samples on a surface of another size."""
         return replace(self, spacing=size * self.spacing)
 
     def beside(self, points: Floats, faces: Ints) -> Resolution:
-        """Coarser, up to twice, at a surface whose edges are all long: a box needs no fine samples on its sides."""
+        """Coarser, up to twice, at a surface whose edges are all long, or one of few vertices.
+
+        A box needs no fine samples on its sides, and few vertices cannot follow a fine volume.
+        """
         edges = sides(faces)
         if not len(edges):
             return self
-        lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-        short = float(np.percentile(lengths, _SHORT_PERCENTILE))
-        return replace(self, spacing=min(max(self.spacing, _SAMPLES_OF_AN_EDGE * short), _COARSEST * self.spacing))
+        short = float(np.percentile(edge_lengths(points, edges), _SHORT_PERCENTILE))
+        coarser = min(max(1.0, _SAMPLES_OF_AN_EDGE * short / self.spacing), _COARSEST)
+        few = min(max(1.0, float(np.sqrt(self.enough / len(points)))), _COARSEST_OF_FEW)
+        return replace(self, spacing=max(coarser, few) * self.spacing)
 
     def around(self, surface: Floats) -> SizeField:
         """Distance between samples as a function of position, around a surface given by samples (k, 3)."""
@@ -77,7 +85,7 @@ class Resolution:
 # With "normal" the in-betweens of mode natural are as good as with finer volumes (docs/science/speed.md). The finer
 # ones are for measures of the volume and for mode linear.
 RESOLUTIONS: dict[Quality, Resolution] = {
-    "normal": Resolution(spacing=0.03, slope=0.3, largest=0.12),
+    "normal": Resolution(spacing=0.03, slope=0.3, largest=0.12, enough=2000),
     "fine": Resolution(spacing=0.02, slope=0.25, largest=0.1),
     "finest": Resolution(spacing=0.014, slope=0.25, largest=0.08),
 }

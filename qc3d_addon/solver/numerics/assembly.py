@@ -7,9 +7,11 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array, csc_array, csr_array
 
 from ..arrays import Floats, Ints
+
+_FEW_ENTRIES = 50_000  # of a sparse matrix: beyond, three products take no longer than one
 
 
 class StiffnessPattern:
@@ -86,6 +88,49 @@ def gradient_operator(elements: Ints, gradients: Floats, count: int) -> csr_arra
     return csr_array(
         (gradients.transpose(2, 0, 1).ravel(), columns, starts), shape=(directions * len(elements), count)
     )
+
+
+def repeated(matrix: csr_array, times: int, values: Floats | None = None) -> csr_array:
+    """(times r, times c) block diagonal matrix of a sparse matrix (r, c), with other values if they are given.
+
+    Parameters
+    ----------
+    matrix : (r, c) sparse
+    times : int
+    values : (times e,), optional
+        The values of the e entries of each block, in their order.
+    """
+    again = np.arange(times, dtype=matrix.indices.dtype)[:, None]
+    starts = np.append((matrix.indptr[:-1] + again * matrix.indptr[-1]).ravel(), times * matrix.indptr[-1])
+    columns = (matrix.indices + again * matrix.shape[1]).ravel()
+    held = np.tile(matrix.data, times) if values is None else values
+    return csr_array((held, columns, starts), shape=(times * matrix.shape[0], times * matrix.shape[1]))
+
+
+class PerCoordinate:
+    """A sparse matrix (r, c) that is applied to each of three coordinates.
+
+    Where it is small, a single product for all three saves calls, which take longer than the numbers.
+    """
+
+    def __init__(self, matrix: csr_array) -> None:
+        self.shape = matrix.shape
+        self._together = 3 if matrix.nnz <= _FEW_ENTRIES else 1
+        self._matrix = repeated(matrix, self._together) if self._together > 1 else matrix
+
+    def __call__(self, coordinates: Floats) -> Floats:
+        """(3, ..., r) the products with an array (3, ..., c)."""
+        return self._applied(self._matrix, coordinates, self.shape[0])
+
+    def transposed(self, coordinates: Floats) -> Floats:
+        """(3, ..., c) the products of the transpose with an array (3, ..., r)."""
+        return self._applied(self._matrix.T, coordinates, self.shape[1])
+
+    def _applied(self, matrix: csr_array | csc_array, coordinates: Floats, rows: int) -> Floats:
+        if self._together > 1 and coordinates.ndim > 2:  # each product is for the coordinates of one shape
+            return np.stack([self._applied(matrix, shape, rows) for shape in np.moveaxis(coordinates, 1, 0)], axis=1)
+        parts = coordinates.reshape(-1 if matrix.shape[1] else 3 // self._together, matrix.shape[1])
+        return np.asarray(np.stack([matrix @ part for part in parts]).reshape(*coordinates.shape[:-1], rows))
 
 
 def stiffness_elements(volumes: Floats, gradients: Floats, conductivity: Floats | None = None) -> Floats:

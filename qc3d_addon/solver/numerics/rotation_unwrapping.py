@@ -62,6 +62,11 @@ class Turning:
             rotations = products(rotations, rotation_matrices(time * self.twist))
         return rotations
 
+    def part(self, chosen: Ints | slice) -> Turning:
+        """The rotations of some of the elements."""
+        swing = self.swing[chosen]
+        return Turning(swing, self.twist[chosen] if self.twist.any() else no_twist(len(swing)))
+
     def other_way(self, chosen: Bools) -> Turning:
         """The same rotations at 1, to which the ``chosen`` elements (m,) turn the other way round."""
         if not chosen.any():
@@ -131,7 +136,7 @@ def consistent_turning(
     share = sums_by_label(forest.labels, weights * _risen(farthest, *_MOST_SWING))
     degree = _risen(share / sums_by_label(forest.labels, weights), *_FAIR_SHARE)[forest.labels]
     if not degree.any():
-        return Turning(vectors, np.zeros_like(vectors))
+        return Turning(vectors, no_twist(count))
     twist = (degree * phases)[:, None] * axes
     swing = swing_beside(turns, twist)
     partly = (degree < 1.0)[:, None]
@@ -142,6 +147,11 @@ def _risen(values: Floats, low: float, high: float) -> Floats:
     """0 up to ``low``, 1 from ``high`` on, rising smoothly between them."""
     part = np.clip((values - low) / (high - low), 0.0, 1.0)
     return np.asarray(part * part * (3.0 - 2.0 * part))
+
+
+def no_twist(count: int) -> Floats:
+    """(count, 3) zeros, which take no memory."""
+    return np.broadcast_to(np.zeros(3), (count, 3))
 
 
 def half_turned(turning: Turning, weights: Floats, labels: Ints, rest: Floats) -> Ints:

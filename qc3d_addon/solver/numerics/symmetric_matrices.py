@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..settings import StretchLaw
 from .rotations import by_component, products
 
@@ -36,6 +36,10 @@ class Stretch:
         values, vectors = np.linalg.eigh(matrices)
         # Rounding may make the smallest eigenvalue of a nearly singular matrix negative.
         return cls(by_component(np.maximum(values, _FLATTEST * values[:, -1:])), by_component(vectors))
+
+    def part(self, chosen: Ints | slice) -> Stretch:
+        """Some of the matrices."""
+        return Stretch(self.values[chosen], self.vectors[chosen])
 
     def at(self, time: float, law: StretchLaw) -> Floats:
         """(m, d, d) stretches at ``time`` t in 0..1: (1 - t) I + t P, or exp(t log P) under the logarithmic law."""

@@ -14,10 +14,12 @@ from pathlib import Path
 from ..errors import InputError
 from ..settings import Quality
 
-# Measured by benchmarks/large.py, with a margin; docs/guide/limits.md has the figures.
-_MB_OF_QUALITY: dict[Quality, float] = {"normal": 140.0, "fine": 160.0, "finest": 200.0, "exact": 140.0}
-_KB_PER_VERTEX = 4.3  # for each pair: the factors of the surface's matrix, and the frames that are computed at once
-_KB_PER_VERTEX_EXACT = 85.0  # of one fit at a time, whose tetrahedra are as fine as the surface
+# Measured by benchmarks/large.py; docs/guide/limits.md has the figures.
+_MB_OF_QUALITY: dict[Quality, float] = {"normal": 105.0, "fine": 125.0, "finest": 165.0, "exact": 140.0}
+# For each pair: of every vertex, and of every moving one the factors of the surface's matrix and the frames that are
+# computed at once.
+_KB_PER_VERTEX, _KB_PER_MOVING = 3.2, 2.1
+_KB_PER_VERTEX_EXACT = 75.0  # of one fit at a time, whose tetrahedra are as fine as the surface
 _BYTES_PER_POSITION = 110.0  # for each vertex in each frame: positions, measures, and temporary arrays
 _MB_WITHOUT_MAPS, _KB_WITHOUT_MAPS = 80.0, 1.3  # for mode straight, which only counts crossings
 _MB_OF_A_COMMAND, _KB_PER_TET = 150.0, 3.0  # for the commands analyze, reconstruct, compress and decompress
@@ -33,7 +35,8 @@ _hears_needs: Callable[[float], None] | None = None
 
 
 def estimated_mb(
-    vertices: int, pairs: int, frames: int, quality: Quality, needs_maps: bool = True, triangles: int = 0
+    vertices: int, pairs: int, frames: int, quality: Quality, needs_maps: bool = True, triangles: int = 0,
+    moving: float = 1.0,
 ) -> float:
     """Estimated peak memory of a bake, in megabytes.
 
@@ -51,13 +54,16 @@ def estimated_mb(
         Whether the volume is mapped at all; mode straight needs no map.
     triangles : int
         Triangles of the mesh; they count where there are more than two for each vertex.
+    moving : float
+        Share of the vertices that the keys move, 0..1.
     """
     positions = vertices * frames * _BYTES_PER_POSITION / 1e6
     size = max(vertices, triangles / 2)
     if not needs_maps:
         return positions + _MB_WITHOUT_MAPS + size * _KB_WITHOUT_MAPS / 1e3
     fit = size * _KB_PER_VERTEX_EXACT / 1e3 if quality == "exact" else 0.0
-    return positions + fit + pairs * (_MB_OF_QUALITY[quality] + size * _KB_PER_VERTEX / 1e3)
+    surface = size * (_KB_PER_VERTEX + moving * _KB_PER_MOVING) / 1e3
+    return positions + fit + pairs * (_MB_OF_QUALITY[quality] + surface)
 
 
 def require_memory(needed_mb: float, limit_mb: float, vertices: int) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..triangles.geometry import edge_lengths
 
 # How far edges may leave the interval between their key lengths for the sake of a component's volume, relative; 99th
 # percentile. It is too small to be seen, and real pairs need up to 0.0015.
@@ -41,7 +42,7 @@ class LengthsFirst:
     """
 
     def __init__(self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats) -> None:
-        ends = [_lengths(key, edges) for key in (key0, key1)]
+        ends = [edge_lengths(key, edges) for key in (key0, key1)]
         usable = np.minimum(*ends) > _SHORTEST
         self._edges = edges[usable]
         self._shortest, self._longest = np.minimum(*ends)[usable], np.maximum(*ends)[usable]
@@ -112,15 +113,16 @@ class LengthsFirst:
     def _excess(self, shape: Floats) -> Floats:
         """(components,) 99th percentile of how far edges leave the interval between their key lengths, relative."""
         excess = self._excesses(shape)
-        order = np.lexsort((excess, self._label))
-        found = np.zeros(int(self._labels.max(initial=-1)) + 1)
-        found[self._has_edges] = excess[order][self._places]
+        found = np.zeros(len(self._counts))
+        if len(self._has_edges) == 1:  # sorting all edges would take as long as a sweep
+            found[self._has_edges] = np.partition(excess, self._places)[self._places]
+        else:
+            found[self._has_edges] = excess[np.lexsort((excess, self._label))][self._places]
         return found
-
 
     def _excesses(self, shape: Floats) -> Floats:
         """(e,) how far each edge leaves the interval of its key lengths."""
-        length = _lengths(shape, self._edges)
+        length = edge_lengths(shape, self._edges)
         return np.asarray(
             np.maximum(np.maximum(length / self._longest, 2.0 - length / self._shortest) - 1.0, 0.0)
         )
@@ -136,8 +138,3 @@ def _allowed(excess: Floats) -> Floats:
 def _tolerable(excess: Floats) -> Floats:
     """(c,) 1 where there is no excess, 0 from twice the largest on, falling gradually."""
     return np.asarray(np.clip(1.0 - 0.5 * excess / _MOST_EXCESS, 0.0, 1.0))
-
-
-def _lengths(shape: Floats, edges: Ints) -> Floats:
-    spans = shape[edges[:, 1]] - shape[edges[:, 0]]
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))

@@ -6,13 +6,15 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
+from ..numerics.blocks import in_blocks
 from ..numerics.grouped_sums import sums_by_label
-from ..numerics.rotation_unwrapping import Turning, consistent_turning, half_turned, mean_turns
+from ..numerics.rotation_unwrapping import consistent_turning, half_turned, mean_turns
 from ..numerics.rotations import by_component
 from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
@@ -48,6 +50,7 @@ SWEEPS = 13
 # More shapes together save little and wait for each other; more triangles go through memory too often.
 _MOST_AT_ONCE = 4
 _TRIANGLES_AT_ONCE = 150_000
+_MANY = 200_000  # triangles: large surfaces keep only what every frame needs
 
 
 class SurfacePath:
@@ -107,9 +110,9 @@ class SurfacePath:
         self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
-        faces = self.group[embedding.pair.faces]
-        triangles, shares = embedding.pair.covering
-        triangles = self.group[triangles]
+        faces, (triangles, shares) = embedding.pair.faces, embedding.pair.covering
+        if count < len(self.group):
+            faces, triangles = self.group[faces], self.group[triangles]
         self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
@@ -162,10 +165,13 @@ class SurfacePath:
             self._anchor_weights + self._line_weights,
         )
         rows = self._surface.rows
-        self._moving_turning = Turning(self.turning.swing[rows], self.turning.twist[rows])
+        self._moving_turning = self.turning.part(rows)
         values, vectors = usable.stretch.values[rows], usable.stretch.vectors[rows]
         self._moving_stretch = Stretch(by_component(values), by_component(vectors))
         self._moving_tangents = by_component(usable.bases[rows, :, :2])
+        # Of many triangles, what only chains need is computed again for them.
+        many = len(usable.faces) > _MANY
+        self.deformation = usable.without_motion() if many else usable.without_directions()
 
     def with_stronger_anchors(self, factors: Floats) -> SurfacePath:
         """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""
@@ -176,9 +182,21 @@ class SurfacePath:
         stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
 
+    def release(self) -> None:
+        """Give up, on large surfaces, memory that will be filled again when it is needed."""
+        self._surface.release()
+
+    def whole_deformation(self) -> TriangleDeformation:
+        """The deformation with its turns and stretches."""
+        if len(self.deformation.turns) == len(self.deformation.faces):
+            return self.deformation
+        triangles, shares = self._embedding.pair.covering
+        key1 = self._embedding.key1[self.vertices]
+        return TriangleDeformation.between(self._key0, key1, self.group[triangles], shares)
+
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates of rotation, stretch and volume at the first and at the second key."""
-        deformation = self.deformation
+        deformation = self.whole_deformation()
         spins = end_spins(self.turning.swing, self.turning.twist)
         slopes = stretch_slopes(deformation.stretch, self._law)
         growth = self._volumes[1] - self._volumes[0]
@@ -189,7 +207,7 @@ class SurfacePath:
 
     def with_end_rates(self, first: Rates, second: Rates) -> SurfacePath:
         """The same path between the same keys with other rates at its ends."""
-        deformation = self.deformation
+        deformation = self.whole_deformation()
         before, after = (own.toward(new) for own, new in zip(self.end_rates(), (first, second), strict=True))
         strain = deformation.spins.transpose(0, 2, 1) @ after.strain @ deformation.spins
         corrected = copy.copy(self)
@@ -225,6 +243,7 @@ class SurfacePath:
         work = Sweeps(self._surface, wanted)
         settled = work.settled(sweeps)
         costly = np.flatnonzero(work.corrected > SMALL_CORRECTION).tolist()
+        del work  # the second sweeps must not need its memory in addition
         if costly:
             free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
             for shape, other in zip(costly, free, strict=True):
@@ -253,21 +272,27 @@ class SurfacePath:
     def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
         anchors = self._places.moved(anchors, time)
-        stretch = self._moving_stretch.at(time, self._law)
         lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
         volumes = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
-        turn_change: Floats | float = 0.0
         if self._correction is not None:
-            rows = self._surface.rows
-            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
-            turn_change = hermite(time, *(slope[rows] for slope in self._correction.turns))
             volumes = volumes + hermite(time, *self._correction.volumes)
-        tangents = tangents_of(self._moving_turning.at(time, turn_change), self._moving_tangents)
+        tangents, stretch = in_blocks(partial(self._wanted_triangles, time), len(self._surface.rows))
         lines = self._embedding.straight(time)[self.vertices]
         share = (self._line_weights / (self._anchor_weights + self._line_weights))[:, None]
         anchors = anchors + share * (lines - anchors)
         start = np.where(self._free[:, None], anchors, lines)
-        return Wanted(start, tangents, stretch, anchors, lengths[self._surface.springs], volumes)
+        return Wanted(start, tangents.transpose(1, 2, 0), stretch, anchors, lengths[self._surface.springs], volumes)
+
+    def _wanted_triangles(self, time: float, part: slice) -> tuple[Floats, Floats]:
+        """(p, 3, 2) the tangents and (p, 2, 2) the stretches of some moving triangles."""
+        stretch = self._moving_stretch.part(part).at(time, self._law)
+        change: Floats | float = 0.0
+        if self._correction is not None:
+            rows = self._surface.rows[part]
+            stretch = stretch + hermite(time, *(slope[rows] for slope in self._correction.stretches))
+            change = hermite(time, *(slope[rows] for slope in self._correction.turns))
+        rotations = self._moving_turning.part(part).at(time, change)
+        return tangents_of(rotations, self._moving_tangents[part]).transpose(2, 0, 1), stretch
 
 
 def _spans(positions: Floats, edges: Ints) -> Floats:

@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
 
 from ..arrays import Floats
 from ..numerics.chebyshev import ChebyshevIteration
+from .pieces import TRIANGLES_IN_CACHE, Operator
 from .system import MovingSurface
 from .tangents import closest_tangents, stretched
 
@@ -31,7 +30,6 @@ _SETTLED = 1e-10  # cube units; smaller changes are mostly rounding
 _LARGEST_VOLUME_STEP = 0.1  # of the wanted volume: the range in which its linear model is good enough
 _LAST_VOLUME_STEPS = 12  # a cap; a few steps usually suffice
 _VOLUME_TOLERANCE = 1e-12  # relative; rounding
-_TRIANGLES_IN_CACHE = 30_000  # a dozen arrays of this many triangles fit into the cache of one core
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,31 +60,6 @@ class Wanted:
     volumes: Floats
 
 
-class _Operator(NamedTuple):
-    """The gradient operator of several shapes, multiplied by their stretches.
-
-    ``gradient`` takes one coordinate of all used vertices, ordered by shape, to derivatives ordered by shape, direction
-    and triangle; ``spread`` is its transpose.
-    """
-
-    shapes: slice
-    gradient: csr_array
-    spread: csc_array
-
-    @classmethod
-    def of(cls, surface: MovingSurface, shapes: slice, stretch: Floats) -> _Operator:
-        """The operator for shapes with the stretches (q, m, 2, 2)."""
-        # Shape by shape: einsum over several would round differently depending on their number.
-        values = np.stack([np.einsum("mcb,mbd->dcm", surface.hats, part).transpose(0, 2, 1) for part in stretch])
-        # Block diagonal: the sparsity pattern of one shape, repeated.
-        one = surface.gradient
-        columns = one.indices + np.arange(len(stretch), dtype=one.indices.dtype)[:, None] * one.shape[1]
-        starts = np.arange(0, values.size + 1, 3, dtype=one.indices.dtype)
-        shape = (len(stretch) * one.shape[0], len(stretch) * one.shape[1])
-        gradient = csr_array((values.ravel(), columns.ravel(), starts), shape=shape)
-        return cls(shapes, gradient, gradient.T)
-
-
 class Sweeps:
     """The sweeps of q shapes at once; the result of each shape does not depend on the others.
 
@@ -114,10 +87,11 @@ class Sweeps:
         # The moving vertices first, then the still ones next to them.
         self._positions = np.stack([shape.start[surface.used].T for shape in wanted], axis=1)
         self._anchors = np.stack([shape.anchors[surface.moving].T for shape in wanted], axis=1)
-        self._stretch = np.stack([shape.stretch for shape in wanted])
+        self._stretch = [shape.stretch for shape in wanted]
         self._lengths = np.stack([shape.lengths for shape in wanted])
         self._missing_volumes = [shape.volumes - surface.volumes.resting(shape.start) for shape in wanted]
         self._volume_direction: Floats | None = None
+        self._found: list[tuple[Floats, Floats]] | None = None
 
     def settled(self, sweeps: int) -> list[Floats]:
         """(n, 3) positions of each shape, cube units, after the given number of sweeps."""
@@ -154,42 +128,45 @@ class Sweeps:
 
     def _move(self, moved: Floats) -> None:
         self._positions[:, :, self._moving] = moved
+        self._found = None
+
+    def _volumes_and_slopes(self) -> list[tuple[Floats, Floats]]:
+        """Of each shape, where it is now."""
+        if self._found is None:
+            shapes = self._positions.transpose(1, 0, 2)
+            self._found = [self._surface.volumes.with_slope(shape) for shape in shapes]
+        return self._found
 
     @cached_property
-    def _operators(self) -> list[_Operator]:
-        """Gradient operators with the wanted stretches, each for as many shapes as the processor's cache can hold."""
-        surface, shapes = self._surface, len(self._wanted)
-        size = max(1, _TRIANGLES_IN_CACHE // max(1, len(surface.rows)))
-        return [
-            _Operator.of(surface, slice(first, first + size), self._stretch[first : first + size])
-            for first in range(0, shapes, size)
-        ]
+    def _few(self) -> list[slice]:
+        """The shapes, as many at a time as the processor's cache can hold."""
+        size, count = max(1, TRIANGLES_IN_CACHE // max(1, len(self._surface.rows))), len(self._wanted)
+        return [slice(first, min(first + size, count)) for first in range(0, count, size)]
+
+    @cached_property
+    def _operators(self) -> list[Operator]:
+        """Gradient operators with the wanted stretches."""
+        return [piece.operator(shapes, self._stretch) for shapes in self._few for piece in self._surface.pieces]
 
     @cached_property
     def _constant_load(self) -> Floats:
         resting = self._positions[:, :, len(self._surface.moving) :]
         return np.asarray(
-            self._surface.anchor_weights * self._anchors - _applied(self._surface.stiffness_beside, resting)
+            self._surface.anchor_weights * self._anchors - self._surface.stiffness_beside(resting)
         )
 
-    def _closest_tangents(self, operator: _Operator, lengths: Floats | float = 1.0) -> Floats:
-        """(3, 2, q, m) the local step for the operator's shapes; in memory, the shape comes before the direction."""
-        positions = self._positions[:, operator.shapes]
-        rows = [operator.gradient @ coordinate.ravel() for coordinate in positions]
-        gradients = np.stack(rows).reshape(3, positions.shape[1], 2, len(self._surface.rows))
-        return closest_tangents(gradients.transpose(0, 2, 1, 3), lengths)
+    def _closest_tangents(self, operator: Operator, lengths: Floats | float = 1.0) -> Floats:
+        """(3, 2, q, p) the local step for the operator's shapes; in memory, the shape comes before the direction."""
+        return closest_tangents(operator.gradients(self._positions), lengths)
 
     def _refitted(self) -> Floats:
         """(3, q, k) positions after one sweep: rotations are fitted to the present positions, positions to them."""
-        load = self._constant_load.copy()
+        load = np.zeros_like(self._positions)
         for operator in self._operators:
-            tangents = self._closest_tangents(operator, self._surface.weights).transpose(0, 2, 1, 3)
-            for coordinate, towards in enumerate(tangents):
-                spread = operator.spread @ towards.ravel()
-                load[coordinate, operator.shapes] += spread.reshape(len(towards), -1)[:, self._moving]
+            operator.add_spread(self._closest_tangents(operator, self._surface.weights[operator.triangles]), load)
         if self._lengths.size:
-            load += _applied(self._surface.spans.T, self._wanted_spans())[:, :, self._moving]
-        return self._surface.solve(load)
+            load += self._surface.spans.transposed(self._wanted_spans())
+        return self._surface.solve(self._constant_load + load[:, :, self._moving])
 
     def _corrected(self, first: bool) -> Floats:
         """(3, q, k) positions after a global step that is solved for the change from the present positions.
@@ -198,32 +175,34 @@ class Sweeps:
         needles and tiny parts from spoiling positions that are right already.
         """
         surface = self._surface
-        load = surface.anchor_weights * (self._anchors - self._moved)
-        for operator in self._operators:
-            shapes = operator.shapes
+        load = np.zeros_like(self._positions)
+        pieces = ((shapes, piece) for shapes in self._few for piece in surface.pieces)
+        for operator, (shapes, piece) in zip(self._operators, pieces, strict=True):
+            part = piece.triangles
             if first:
-                tangents = np.stack([shape.tangents for shape in self._wanted[shapes]], axis=2)
+                tangents = np.stack([shape.tangents[:, :, part] for shape in self._wanted[shapes]], axis=2)
             else:
                 tangents = self._closest_tangents(operator)
-            gradients = _applied(surface.gradient, self._positions[:, shapes])
-            missing = stretched(self._stretch[shapes], tangents).transpose(0, 2, 1, 3).reshape(gradients.shape)
-            missing = (missing - gradients) * np.tile(surface.weights, 2)
-            load[:, shapes] += _applied(surface.gradient.T, missing)[:, :, self._moving]
+            unstretched = piece.operator(shapes)
+            missing = stretched(np.stack([one[part] for one in self._stretch[shapes]]), tangents)
+            missing -= unstretched.gradients(self._positions)
+            missing *= surface.weights[part]
+            unstretched.add_spread(missing, load)
         if self._lengths.size:
-            missing_spans = self._wanted_spans() - _applied(surface.spans, self._positions)
-            load += _applied(surface.spans.T, missing_spans)[:, :, self._moving]
-        return np.asarray(self._moved + surface.solve(load))
+            load += surface.spans.transposed(self._wanted_spans() - surface.spans(self._positions))
+        present = self._moved
+        pulled = surface.anchor_weights * (self._anchors - present)
+        return np.asarray(present + surface.solve(pulled + load[:, :, self._moving]))
 
     def _wanted_spans(self) -> Floats:
         """(3, q, s) the springs' vectors with the wanted lengths, in their present directions."""
-        spans = _applied(self._surface.spans, self._positions)
+        spans = self._surface.spans(self._positions)
         present = np.sqrt((spans**2).sum(axis=0))
         return np.asarray(spans * np.where(present > 1e-12, self._lengths / np.maximum(present, 1e-12), 0.0))
 
     def _with_volumes(self, moved: Floats) -> Floats:
         """(3, q, k) positions ``moved``, corrected so that every closed component has its volume to first order."""
-        volumes = self._surface.volumes
-        found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
+        volumes, found = self._surface.volumes, self._volumes_and_slopes()
         direction = self._direction()
         present, result = self._moved, np.empty_like(moved)
         for shape, (enclosed, slope) in enumerate(found):
@@ -237,8 +216,7 @@ class Sweeps:
         """Keep what volumes miss where they are looked at for the first time."""
         if not self._holds_volumes or self.corrected.any():
             return
-        shapes = self._positions.transpose(1, 0, 2)
-        found = np.stack([self._surface.volumes.with_slope(shape)[0] for shape in shapes])
+        found = np.stack([enclosed for enclosed, _ in self._volumes_and_slopes()])
         wanted = np.abs(np.stack([shape.volumes for shape in self._wanted]))
         missing = np.abs(np.stack(self._missing_volumes) - found)
         self.corrected = (missing / np.where(wanted > 0.0, wanted, np.inf)).max(axis=1, initial=0.0)
@@ -261,8 +239,8 @@ class Sweeps:
         if not self._holds_volumes:
             return
         for _ in range(_LAST_VOLUME_STEPS):
-            found = [volumes.with_slope(shape) for shape in self._positions.transpose(1, 0, 2)]
-            direction = self._direction()
+            found, direction = self._volumes_and_slopes(), self._direction()
+            self._found = None
             restored = True
             for shape, (enclosed, slope) in enumerate(found):
                 missing = self._missing_volumes[shape] - enclosed
@@ -274,8 +252,3 @@ class Sweeps:
                     )
             if restored:
                 break
-
-
-def _applied(matrix: csr_array | csc_array, coordinates: Floats) -> Floats:
-    """(3, q, r) a matrix (r, c) applied to each row of an array (3, q, c)."""
-    return np.stack([[matrix @ row for row in shapes] for shapes in coordinates])

@@ -9,18 +9,23 @@ left out of the system.
 from __future__ import annotations
 
 import copy
+from threading import Lock
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import SuperLU
 
 from ..arrays import Bools, Floats, Ints
-from ..numerics.assembly import StiffnessPattern, gradient_operator, stiffness_elements
+from ..numerics.assembly import PerCoordinate, StiffnessPattern, stiffness_elements
 from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotations import by_component
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.deformation import TriangleDeformation
 from ..triangles.topology import distinct
+from .pieces import pieces_of
 from .volumes import MovingVolumes
+
+_MANY = 100_000  # moving vertices: factoring again takes no longer than a sweep
 
 
 class MovingSurface:
@@ -48,13 +53,18 @@ class MovingSurface:
     Attributes
     ----------
     rows : (m,) int64
-        Indices, in the deformation, of the moving triangles: those with a moving corner.
+        Indices, in the deformation, of the moving triangles: those with a moving corner, in the order in which their
+        first corners are eliminated, so that neighbors in memory are neighbors on the surface.
     springs : (s,) int64
         Indices of the moving springs: those with a moving end.
     moving : (k,) int64
         The moving vertices, in the order of elimination.
     used : (l,) int64
         The moving vertices, followed by the still vertices next to them.
+    weights : (m,)
+        Of the moving triangles.
+    pieces : list of Piece
+        The moving triangles, in their order.
     """
 
     def __init__(
@@ -71,11 +81,11 @@ class MovingSurface:
         self.rows: Ints = np.flatnonzero(free[deformation.faces].any(axis=1))
         self.springs: Ints = np.flatnonzero(free[springs].any(axis=1))
         faces, edges = deformation.faces[self.rows], springs[self.springs]
-        self.weights = deformation.weights[self.rows]
-        self.hats = by_component(deformation.gradients[self.rows])
         spring = np.broadcast_to(np.array([[1.0, -1.0], [-1.0, 1.0]]), (len(edges), 2, 2))
         stiffness = csr_array(
-            StiffnessPattern(faces, count).assemble(stiffness_elements(self.weights, self.hats))
+            StiffnessPattern(faces, count).assemble(
+                stiffness_elements(deformation.weights[self.rows], by_component(deformation.gradients[self.rows]))
+            )
             + StiffnessPattern(edges, count).assemble(spring)
         )
         moving = np.flatnonzero(free)
@@ -86,29 +96,43 @@ class MovingSurface:
         self.moving, self.used = moving, np.concatenate([moving, beside])
         number = np.zeros(count, dtype=np.int64)
         number[self.used] = np.arange(len(self.used))
-        self.faces = number[faces]
+        corners = number[faces]
+        in_order = np.argsort(corners.min(axis=1, initial=count), kind="stable")
+        self.rows, corners = self.rows[in_order], corners[in_order]
+        self.weights = deformation.weights[self.rows]
         self._stiffness = csr_array(stiffness[moving][:, moving])
-        self.stiffness_beside = csr_array(stiffness[moving][:, beside])
+        self.stiffness_beside = PerCoordinate(csr_array(stiffness[moving][:, beside]))
         self.volumes = MovingVolumes(closed, covering, moving, self.used)
-        self.gradient = gradient_operator(self.faces, self.hats, len(self.used))
+        self.pieces = pieces_of(corners, by_component(deformation.gradients[self.rows]), len(self.used))
         ends = np.tile([-1.0, 1.0], len(edges)), number[edges].ravel(), np.arange(0, 2 * len(edges) + 1, 2)
-        self.spans = csr_array(ends, shape=(len(edges), len(self.used)))
-        self._factor(anchor_weights)
+        self.spans = PerCoordinate(csr_array(ends, shape=(len(edges), len(self.used))))
+        self._use(anchor_weights)
 
     def with_anchor_weights(self, anchor_weights: Floats) -> MovingSurface:
         """The same system with other anchor weights (n,)."""
         other = copy.copy(self)
-        other._factor(anchor_weights)
+        other._use(anchor_weights)
         return other
 
-    def _factor(self, anchor_weights: Floats) -> None:
+    def _use(self, anchor_weights: Floats) -> None:
         self.anchor_weights = anchor_weights[self.moving]
-        self._factored = factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
+        self._making = Lock()
+        self._factors: SuperLU | None = self._made()
+
+    def _made(self) -> SuperLU:
+        return factored(csr_array(self._stiffness + diags_array(self.anchor_weights)))
+
+    def release(self) -> None:
+        """Give up the factors of a large surface, a third of all memory, until they are needed again."""
+        if len(self.moving) > _MANY:
+            self._factors = None
 
     def solve(self, loads: Floats) -> Floats:
         """(..., k) solutions for loads (..., k) on the moving vertices.
 
         Solving for many loads in one call is faster: the factors are read from memory once.
         """
+        with self._making:
+            factors = self._factors = self._factors or self._made()
         flat = loads.reshape(-1, loads.shape[-1])
-        return np.asarray(self._factored.solve(flat.T).T.reshape(loads.shape))
+        return np.asarray(factors.solve(flat.T).T.reshape(loads.shape))

@@ -8,10 +8,13 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
+from ..numerics.assembly import PerCoordinate
 from ..numerics.grouped_sums import sums_by_label
 from ..triangles.closed_volume import ClosedComponents, volumes_seen_from
 from ..triangles.geometry import cross_product
 from ..triangles.topology import distinct
+
+_TRIANGLES_AT_ONCE = 15_000  # their arrays fit into the cache of one core
 
 
 class MovingVolumes:
@@ -54,11 +57,11 @@ class MovingVolumes:
         self._views[labels] = corners[first]
         # The three corners of each triangle and the apex of its cone.
         self._looked_at = np.concatenate([self._corners, number[self._views[self._label_of_face]][None]])
-        self._incidence = _incidence(self._corners, len(moving))
+        self._incidence = PerCoordinate(_incidence(self._corners, len(moving)))
         triangles, shares = covering
         touched = closed.among(triangles) & moves[triangles].any(axis=1)
         self._even_corners: Ints = np.ascontiguousarray(number[triangles[touched]].T)
-        self._even_incidence = _incidence(self._even_corners, len(moving), shares[touched])
+        self._even_incidence = PerCoordinate(_incidence(self._even_corners, len(moving), shares[touched]))
 
     @property
     def empty(self) -> bool:
@@ -83,20 +86,27 @@ class MovingVolumes:
         slope : (3, k)
             Derivative of the volume of each moving vertex's component with respect to the vertex's coordinates.
         """
-        seen = np.empty((3, *self._looked_at.shape))
-        for axis in range(3):
-            np.take(positions[axis], self._looked_at, out=seen[axis], mode="clip")
-        first, second, third, view = seen.transpose(1, 0, 2)
-        normals = cross_product(second - first, third - first)
-        shares = ((first - view) * normals).sum(axis=0)
+        normals, shares = np.empty(self._corners.shape), np.empty(self._corners.shape[1])
+        for start in range(0, len(shares), _TRIANGLES_AT_ONCE):
+            part = slice(start, start + _TRIANGLES_AT_ONCE)
+            looked_at = self._looked_at[:, part]
+            seen = np.empty((3, *looked_at.shape))
+            for axis in range(3):
+                np.take(positions[axis], looked_at, out=seen[axis], mode="clip")
+            first, second, third, view = seen.transpose(1, 0, 2)
+            normals[:, part] = cross_product(second - first, third - first)
+            shares[part] = ((first - view) * normals[:, part]).sum(axis=0)
         volumes = sums_by_label(self._label_of_face, shares, self._components) / 6.0
-        return volumes, np.stack([self._incidence @ normal for normal in normals]) / 6.0
+        return volumes, self._incidence(normals) / 6.0
 
     def even_slope(self, positions: Floats) -> Floats:
         """(3, k) how volumes change with what moves, polygons taken as the mean of all ways to triangulate them."""
-        first, second, third = (positions[:, corners] for corners in self._even_corners)
-        normals = cross_product(second - first, third - first)
-        return np.asarray(np.stack([self._even_incidence @ normal for normal in normals]) / 6.0)
+        normals = np.empty(self._even_corners.shape)
+        for start in range(0, normals.shape[1], _TRIANGLES_AT_ONCE):
+            part = slice(start, start + _TRIANGLES_AT_ONCE)
+            first, second, third = (positions[:, corners] for corners in self._even_corners[:, part])
+            normals[:, part] = cross_product(second - first, third - first)
+        return np.asarray(self._even_incidence(normals) / 6.0)
 
     def changes(self, slope: Floats, moves: Floats) -> Floats:
         """(components,) first-order change of the volumes if the moving vertices are displaced by ``moves`` (3, k)."""

@@ -7,8 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..numerics.blocks import in_blocks
 from ..numerics.grouped_sums import sums_by_label
-from .geometry import areas
+from .geometry import areas, cross_product
 from .topology import closed_faces
 
 # A part that is turned inside out still encloses, relative to its area, at least this fraction of its former volume. A
@@ -36,7 +37,7 @@ class ClosedComponents:
 
     def __init__(self, faces: Ints, labels: Ints) -> None:
         closed = closed_faces(faces, labels)
-        self.faces = faces[closed]
+        self.faces = faces if closed.all() else faces[closed]
         self.labels = labels
         self._is_closed = np.zeros(int(labels.max(initial=-1)) + 1, dtype=bool)
         self._is_closed[labels[self.faces[:, 0]]] = True
@@ -76,6 +77,10 @@ class ClosedComponents:
 def volumes_seen_from(views: Floats, positions: Floats, faces: Ints, labels: Ints) -> Floats:
     """(k,) signed volumes of the cones over triangles (m, 3), by component; the apexes are ``views`` (k, 3)."""
     label = labels[faces[:, 0]]
-    first, second, third = (positions[faces[:, corner]] - views[label] for corner in range(3))
-    shares = np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0
-    return sums_by_label(label, shares, len(views))
+
+    def cones(rows: slice) -> tuple[Floats]:
+        view = views.take(label[rows], axis=0)
+        first, second, third = ((positions.take(faces[rows, corner], axis=0) - view).T for corner in range(3))
+        return (np.einsum("im,im->m", first, cross_product(second, third)) / 6.0,)
+
+    return sums_by_label(label, in_blocks(cones, len(faces))[0], len(views))

@@ -10,14 +10,16 @@ positions (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling").
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..numerics.blocks import in_blocks
 from ..numerics.rotations import rotation_vectors
 from ..numerics.symmetric_matrices import Stretch
-from .geometry import face_normals, hat_gradients, planar_jacobians, tangent_bases
+from .geometry import areas, hat_gradients, planar_jacobians, tangent_bases
 
 # Triangles whose area is less than this part of the largest have no usable directions in floating point. Nor do those
 # whose height may be rounding alone: a few steps of single precision, in which Blender has its coordinates, at the
@@ -43,15 +45,16 @@ class TriangleDeformation:
         Weights in least-squares fits: proportional to the square root of the area, so that small triangles keep their
         lengths too. Their sum is the area of the surface in the first key.
     bases : (m, 3, 3)
-        Columns: two tangents and the unit normal in the first key.
+        Columns: two tangents and the unit normal in the first key; empty where they are not needed any more.
     gradients : (m, 3, 2)
-        Gradients of the hat functions, in the tangent basis of the first key.
+        Gradients of the hat functions, in the tangent basis of the first key; likewise.
     stretch : Stretch
         Symmetric in-plane stretches (m, 2, 2) from the first key to the second.
     turns : (m, 3)
         Rotation vectors in radians, with angles in [0, pi].
-    spins : (m, 2, 2)
-        In-plane rotations from the tangents of the first key, carried along by the rotation, to those of the second.
+    angles : (m,)
+        Of the in-plane rotations from the tangents of the first key, carried along by the rotation, to those of the
+        second; radians.
     rows : (m,) int64
         Indices of these triangles in the whole mesh.
     """
@@ -62,7 +65,7 @@ class TriangleDeformation:
     gradients: Floats
     stretch: Stretch
     turns: Floats
-    spins: Floats
+    angles: Floats
     rows: Ints
 
     @classmethod
@@ -73,30 +76,46 @@ class TriangleDeformation:
 
         What they count is multiplied by ``shares`` (m,).
         """
-        double0, double1 = (np.linalg.norm(face_normals(key, faces), axis=1) for key in (key0, key1))
-        longest = [_longest_sides(key, faces) for key in (key0, key1)]
-        usable = (double0 > _least_area(key0, double0, longest[0])) & (double1 > _least_area(key1, double1, longest[1]))
-        flatness = np.stack([double0 * longest[1] ** 2, double1 * longest[0] ** 2])
+        double0, double1 = (2.0 * areas(key, faces) for key in (key0, key1))
+        longest0, longest1 = (
+            in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1)
+        )
+        usable = (double0 > _least_area(key0, double0, longest0)) & (double1 > _least_area(key1, double1, longest1))
+        flatness = np.stack([double0 * longest1**2, double1 * longest0**2])
         usable &= flatness.min(axis=0) > _PRESSED * flatness.max(axis=0)
-        faces = faces[usable]
-        bases0, bases1 = tangent_bases(key0, faces), tangent_bases(key1, faces)
-        gradients = hat_gradients(key0, faces, bases0)
-        planar = planar_jacobians(key1, faces, bases1, gradients)
-        spin = _planar_rotations(planar)
-        stretch = spin.transpose(0, 2, 1) @ planar
-        stretch = 0.5 * (stretch + stretch.transpose(0, 2, 1))
-        rotations = _lifted(bases1, spin) @ bases0.transpose(0, 2, 1)
-        areas = 0.5 * (shares * double0)[usable]
-        weights = np.sqrt(np.broadcast_to(shares, usable.shape)[usable] * areas)
-        weights *= areas.sum() / max(float(weights.sum()), 1e-300)
-        turns = rotation_vectors(rotations)
-        return cls(faces, weights, bases0, gradients, Stretch.of(stretch), turns, spin, np.flatnonzero(usable))
+        faces = faces if usable.all() else faces[usable]
 
+        def parts(rows: slice) -> tuple[Floats, ...]:
+            bases0, bases1 = tangent_bases(key0, faces[rows]), tangent_bases(key1, faces[rows])
+            gradients = hat_gradients(key0, faces[rows], bases0)
+            planar = planar_jacobians(key1, faces[rows], bases1, gradients)
+            angles = np.arctan2(planar[:, 1, 0] - planar[:, 0, 1], planar[:, 0, 0] + planar[:, 1, 1])
+            spin = _planar_rotations(angles)
+            matrices = spin.transpose(0, 2, 1) @ planar
+            stretch = Stretch.of(0.5 * (matrices + matrices.transpose(0, 2, 1)))
+            turns = rotation_vectors(_lifted(bases1, spin) @ bases0.transpose(0, 2, 1))
+            return bases0, gradients, stretch.values, stretch.vectors, turns, angles
 
-def _longest_sides(key: Floats, faces: Ints) -> Floats:
-    """(m,) length of the longest side of each triangle."""
-    corners = key[faces]
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0))
+        bases, gradients, values, vectors, turns, angles = in_blocks(parts, len(faces))
+        sizes = 0.5 * (shares * double0)[usable]
+        weights = np.sqrt(np.broadcast_to(shares, usable.shape)[usable] * sizes)
+        weights *= sizes.sum() / max(float(weights.sum()), 1e-300)
+        rows = np.flatnonzero(usable)
+        return cls(faces, weights, bases, gradients, Stretch(values, vectors), turns, angles, rows)
+
+    @property
+    def spins(self) -> Floats:
+        """(m, 2, 2) the in-plane rotations."""
+        return _planar_rotations(self.angles)
+
+    def without_directions(self) -> TriangleDeformation:
+        """The same without bases and gradients, which take half of the memory."""
+        return replace(self, bases=np.empty((0, 3, 3)), gradients=np.empty((0, 3, 2)))
+
+    def without_motion(self) -> TriangleDeformation:
+        """Only which triangles there are, and what they weigh."""
+        nothing = Stretch(np.empty((0, 2)), np.empty((0, 2, 2)))
+        return replace(self.without_directions(), stretch=nothing, turns=np.empty((0, 3)), angles=np.empty(0))
 
 
 def _least_area(key: Floats, double: Floats, longest: Floats) -> Floats:
@@ -108,11 +127,20 @@ def _least_area(key: Floats, double: Floats, longest: Floats) -> Floats:
     return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
 
 
-def _planar_rotations(planar: Floats) -> Floats:
-    """(m, 2, 2) rotations closest to 2 x 2 matrices (m, 2, 2)."""
-    cosine, sine = planar[:, 0, 0] + planar[:, 1, 1], planar[:, 1, 0] - planar[:, 0, 1]
-    angle = np.arctan2(sine, cosine)
-    cosine, sine = np.cos(angle), np.sin(angle)
+def _longest_among(key: Floats, faces: Ints, rows: slice) -> tuple[Floats]:
+    return (_longest_sides(key, faces[rows]),)
+
+
+def _longest_sides(key: Floats, faces: Ints) -> Floats:
+    """(m,) length of the longest side of each triangle."""
+    corners = key[faces]
+    spans = corners - corners[:, [2, 0, 1]]
+    return np.asarray(np.sqrt(np.einsum("mij,mij->mi", spans, spans).max(axis=1, initial=0.0)))
+
+
+def _planar_rotations(angles: Floats) -> Floats:
+    """(m, 2, 2) rotations by angles (m,) in the plane, radians."""
+    cosine, sine = np.cos(angles), np.sin(angles)
     return np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
 
 

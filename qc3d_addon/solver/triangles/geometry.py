@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..numerics.blocks import in_blocks
 from ..numerics.grouped_sums import sums_by_label
 
 
@@ -80,7 +81,31 @@ def areas(positions: Floats, faces: Ints) -> Floats:
     >>> areas(corners, np.array([[0, 1, 2]]))
     array([0.5])
     """
-    return np.asarray(0.5 * np.linalg.norm(face_normals(positions, faces), axis=1))
+
+    def doubled(rows: slice) -> tuple[Floats]:
+        first, second, third = (positions.take(faces[rows, corner], axis=0).T for corner in range(3))
+        normals = cross_product(second - first, third - first)
+        return (np.sqrt(np.einsum("im,im->m", normals, normals)),)
+
+    return 0.5 * in_blocks(doubled, len(faces))[0]
+
+
+def edge_lengths(positions: Floats, edges: Ints) -> Floats:
+    """(e,) lengths of edges (e, 2) with ends at positions (n, 3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> edge_lengths(np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]), np.array([[0, 1]]))
+    array([5.])
+    """
+
+    def lengths(rows: slice) -> tuple[Floats]:
+        spans = positions.take(edges[rows, 1], axis=0)
+        spans -= positions.take(edges[rows, 0], axis=0)
+        return (np.sqrt(np.einsum("ij,ij->i", spans, spans)),)
+
+    return in_blocks(lengths, len(edges))[0]
 
 
 def vertex_areas(points: Floats, faces: Ints, shares: Floats | float = 1.0) -> Floats:

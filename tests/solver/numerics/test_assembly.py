@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from qc3d_addon.solver.arrays import Ints
-from qc3d_addon.solver.numerics.assembly import StiffnessPattern, stiffness_elements
+from qc3d_addon.solver.numerics import assembly
+from qc3d_addon.solver.numerics.assembly import PerCoordinate, StiffnessPattern, repeated, stiffness_elements
 from qc3d_addon.solver.tets.mesh import TetMesh
 
 from ..meshes import icosphere, jittered_grid
@@ -85,3 +87,24 @@ def test_triangles_have_the_cotangent_laplacian() -> None:
     gradients = np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]])
     expected = [[1.0, -0.5, -0.5], [-0.5, 0.5, 0.0], [-0.5, 0.0, 0.5]]
     np.testing.assert_allclose(stiffness_elements(np.array([0.5]), gradients)[0], expected, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("few", [0, 10**6])
+@pytest.mark.parametrize("shape", [(3, 5), (3, 2, 5)])
+def test_a_matrix_for_each_coordinate(few: int, shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(assembly, "_FEW_ENTRIES", few)
+    random = np.random.default_rng(1)
+    dense = random.normal(size=(4, 5)) * (random.random((4, 5)) < 0.5)
+    values, loads = random.normal(size=shape), random.normal(size=(*shape[:-1], 4))
+    matrix = PerCoordinate(csr_array(dense))
+    np.testing.assert_allclose(matrix(values), values @ dense.T, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(matrix.transposed(loads), loads @ dense, rtol=0.0, atol=1e-14)
+
+
+def test_blocks_along_the_diagonal() -> None:
+    dense = np.array([[1.0, 0.0, 2.0], [0.0, 0.0, 3.0]])
+    twice = repeated(csr_array(dense), 2).toarray()
+    np.testing.assert_array_equal(twice, np.kron(np.eye(2), dense))
+    other = repeated(csr_array(dense), 2, np.arange(6.0)).toarray()
+    assert other[3, 5] == 5.0
+    assert other[0, 0] == 0.0

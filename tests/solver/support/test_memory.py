@@ -20,31 +20,38 @@ from qc3d_addon.solver.support.memory import estimated_mb, machine_limit_mb, req
 KEYS = ("Basis", "Up")
 
 
-# Vertices, frames, quality and the megabytes that benchmarks/large.py measured.
+# Vertices, share of them that move, frames, quality and the megabytes that benchmarks/large.py measured.
 @pytest.mark.parametrize(
-    ("vertices", "frames", "quality", "measured"),
+    ("vertices", "moving", "frames", "quality", "measured"),
     [
-        (6890, 7, "normal", 152),
-        (6890, 7, "fine", 170),
-        (6890, 7, "finest", 205),
-        (6890, 49, "fine", 192),
-        (27554, 7, "normal", 236),
-        (27554, 7, "fine", 248),
-        (110210, 7, "normal", 581),
-        (110210, 7, "fine", 601),
-        (110210, 49, "normal", 1007),
-        (440834, 7, "normal", 2010),
+        (6890, 0.4, 6, "normal", 118),
+        (27554, 0.41, 6, "normal", 229),
+        (110210, 0.41, 6, "normal", 585),
+        # The limb of benchmarks/stages.py, all of which moves.
+        (10000, 1.0, 6, "normal", 158),
+        (100000, 1.0, 6, "normal", 664),
         # These two are the peaks of processes that only fitted.
-        (3926, 0, "exact", 399),
-        (6890, 0, "exact", 603),
+        (3926, 1.0, 0, "exact", 399),
+        (6890, 1.0, 0, "exact", 603),
     ],
 )
-def test_the_estimate_is_above_what_was_measured_and_near_it(
-    vertices: int, frames: int, quality: str, measured: float
+def test_the_estimate_is_within_a_quarter_of_what_was_measured(
+    vertices: int, moving: float, frames: int, quality: str, measured: float
 ) -> None:
-    estimate = estimated_mb(vertices, 1, frames, quality)  # type: ignore[arg-type]
-    assert measured <= estimate * 1.02
-    assert estimate <= 1.3 * measured + 60.0
+    estimate = estimated_mb(vertices, 1, frames, quality, moving=moving)  # type: ignore[arg-type]
+    assert abs(estimate - measured) < 0.25 * measured
+
+
+def test_what_does_not_move_needs_less() -> None:
+    points = np.random.default_rng(0).uniform(size=(10_000, 3))
+    half = points.copy()
+    half[5_000:] += 1.0
+    tasks = [
+        Task.of_keys({"Basis": points, "Up": other}, [[0, 1, 2]], None, KEYS, times=evenly_spaced(5))
+        for other in (half, points + 1.0)
+    ]
+    assert tasks[0].estimated_mb == pytest.approx(estimated_mb(10_000, 1, 7, "normal", moving=0.5))
+    assert tasks[1].estimated_mb == pytest.approx(estimated_mb(10_000, 1, 7, "normal"))
 
 
 def test_a_hundred_thousand_vertices_need_less_than_4_gb() -> None:
@@ -57,7 +64,7 @@ def test_a_million_vertices_are_refused_before_anything_starts() -> None:
     faces = np.arange(999_999).reshape(-1, 3)
     no_edges = np.empty((0, 2), dtype=np.int64)
     task = Task.of_keys({"Basis": points, "Up": points * 2.0}, faces, no_edges, KEYS, times=evenly_spaced(5))
-    with pytest.raises(InputError, match=r"The bake of 1000000 vertices needs about 5\d{3} MB .* its limit is 4096 MB"):
+    with pytest.raises(InputError, match=r"The bake of 1000000 vertices needs about 6\d{3} MB .* its limit is 4096 MB"):
         task.require_memory(4096)
     task.require_memory(12_000)
     task.require_memory(0)  # no limit

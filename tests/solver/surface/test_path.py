@@ -98,7 +98,7 @@ class TestEveryPair:
     def test_shapes_solved_together_are_those_of_each(
         self, pair: tuple[Embedding, SurfacePath], at_once: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(sweeps, "_TRIANGLES_IN_CACHE", at_once)
+        monkeypatch.setattr(sweeps, "TRIANGLES_IN_CACHE", at_once)
         times = (0.0, 0.2, 0.7, 1.0, 0.7)
         together = pair[1].shapes([(time, None) for time in times])
         for time, shape in zip(times, together, strict=True):

@@ -6,9 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from qc3d_addon.solver.arrays import Bools, Floats, Ints
+from qc3d_addon.solver.numerics.nested_dissection import factored
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
+from qc3d_addon.solver.surface import system
 from qc3d_addon.solver.surface.sweeps import Sweeps, Wanted
 from qc3d_addon.solver.surface.system import MovingSurface
 from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
@@ -65,7 +68,7 @@ def test_what_rests_enters_through_its_neighbors() -> None:
     resting = surface.used[len(surface.moving) :]
     wanted = dense_stiffness()[np.ix_(surface.moving, np.flatnonzero(~free))] @ values[~free]
     assert not free[resting].any()
-    assert np.abs(surface.stiffness_beside @ values[resting] - wanted).max() < 1e-12
+    assert np.abs(surface.stiffness_beside(np.tile(values[resting], (3, 1))) - wanted).max() < 1e-12
 
 
 def test_other_anchor_weights_are_as_if_built_anew() -> None:
@@ -74,10 +77,27 @@ def test_other_anchor_weights_are_as_if_built_anew() -> None:
     assert np.array_equal(changed.solve(loads), surface_of(free, np.linspace(1.0, 5.0, COUNT)).solve(loads))
 
 
+def test_factors_that_were_given_up_are_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = surface_of(free_vertices(3), np.ones(COUNT))
+    loads = np.random.default_rng(3).normal(size=(1, len(surface.moving)))
+    before = surface.solve(loads)
+    made: list[csr_array] = []
+    monkeypatch.setattr(system, "factored", lambda matrix: made.append(matrix) or factored(matrix))
+    surface.release()
+    surface.solve(loads)
+    assert not made  # small ones are kept
+    monkeypatch.setattr(system, "_MANY", 1)
+    surface.release()
+    np.testing.assert_array_equal(surface.solve(loads), before)
+    surface.solve(loads)
+    assert len(made) == 1
+
+
 def test_gradients_of_a_linear_function_are_its_slopes() -> None:
     surface = surface_of(free_vertices(4), np.ones(COUNT))
     slope = np.array([1.0, -2.0, 0.5])
-    found = (surface.gradient @ (POINTS @ slope)[surface.used]).reshape(2, -1)
+    (piece,) = surface.pieces
+    found = (piece.gradient @ (POINTS @ slope)[surface.used]).reshape(2, -1)
     bases = TriangleDeformation.between(POINTS, POINTS, FACES).bases[surface.rows]
     assert np.abs(found - np.einsum("mcd,c->dm", bases[:, :, :2], slope)).max() < 1e-12
 
@@ -91,7 +111,7 @@ def test_a_rigid_motion_of_the_wanted_is_met(sweeps: int) -> None:
     volume = ClosedComponents(FACES, np.zeros(COUNT, dtype=np.int64)).volumes(POINTS)
     stretch = np.broadcast_to(np.eye(2), (len(FACES), 2, 2))
     lengths = np.linalg.norm(POINTS[SPRINGS[:, 0]] - POINTS[SPRINGS[:, 1]], axis=1)
-    tangents = np.einsum("ij,mjd->idm", rotation, deformation.bases[:, :, :2])
+    tangents = np.einsum("ij,mjd->idm", rotation, deformation.bases[surface.rows][:, :, :2])
     start = bent(POINTS, 0.2) @ rotation.T
     wanted = Wanted(start, tangents, stretch, goal, lengths, volume)
     settled = Sweeps(surface, [wanted]).settled(60)[0]

@@ -22,7 +22,7 @@ from itertools import pairwise
 import ipctk
 import numpy as np
 
-from qc3d_addon.solver.fit.meeting import crossing_vertices
+from qc3d_addon.solver.fit.own_crossings import crossing_vertices
 from qc3d_addon.solver.frames.task import Task, carry_out
 from qc3d_addon.solver.frames.weights import Weights
 from qc3d_addon.solver.keys.embedding import Embedding

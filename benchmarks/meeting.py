@@ -18,7 +18,8 @@ import numpy as np
 
 from qc3d_addon.solver.errors import QC3DError
 from qc3d_addon.solver.fit.fit_pair import fit_pair
-from qc3d_addon.solver.fit.meeting import MET, crossing_vertices
+from qc3d_addon.solver.fit.meeting import MET
+from qc3d_addon.solver.fit.own_crossings import crossing_vertices
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import determinants
 from qc3d_addon.solver.settings import FitOptions, Quality

@@ -156,7 +156,8 @@ def test_folds_are_avoided_or_said(tmp_path: Path, capsys: pytest.CaptureFixture
     write_tets(tmp_path / "map.npz", folded)
     assert main.main(command) == 0
     number = len(mesh.tets)
-    assert f"{number} tetrahedra of the maps are folded themselves, {number} come back folded" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{number} tetrahedra of the maps are folded themselves, {number} come back folded" in said
     assert json.loads((tmp_path / "r.json").read_text())["own_folds"] == [number]
 
 

@@ -17,18 +17,17 @@ from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
 from ..support.threads import beside
 from ..surface.path import SurfacePath
-from ..triangles.topology import sides
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
 from .fitted_map import FittedMap
 from .lattice import way_on_lattice
-from .meeting import MET, crossing_vertices, meet_keys
+from .meeting import MET, meet_keys
+from .own_crossings import crossing_vertices
 from .volume import Volume, in_single_precision
 
 # As a fraction of the diagonal. Real keys, including self-crossing ones, have residuals below a tenth of this.
 _LARGE_RESIDUAL = 0.03
 _MOST_NAMED = 10  # vertices
-_LEAST_EDGE = 1e-6  # cube units: shorter edges have no stretch that can be told
 
 
 def fit_pair(pair: KeyPair, options: FitOptions, shared: Volume | None = None) -> Steps[FittedMap]:
@@ -100,7 +99,7 @@ def _near(
         yield Progress("mesh", 1.0)
         yield Progress("locate", 0.0)
         with timed(seconds, "locate"):
-            fitter = volume.fitter
+            fitter = volume.fitter.anew()
         yield Progress("locate", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
@@ -117,7 +116,7 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
     yield Progress("mesh", 0.0)
     with beside(partial(_way, embedding, options, seconds)) as way:
         with timed(seconds, "mesh"):
-            volume = Volume.filled(embedding, options, stretches=_stretches(embedding))
+            volume = Volume.filled(embedding, options)
         yield Progress("mesh", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
@@ -127,18 +126,6 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
     return FittedMap(embedding.pair, volume, *parts)
-
-
-def _stretches(embedding: Embedding) -> Floats:
-    """(n,) how many times longer the edges at each vertex are in the second key: the largest ratio."""
-    edges = sides(embedding.pair.faces)
-    before, after = (
-        np.linalg.norm(key[edges[:, 1]] - key[edges[:, 0]], axis=1) for key in (embedding.key0, embedding.key1)
-    )
-    ratios = after / np.maximum(before, _LEAST_EDGE)
-    stretches = np.zeros(len(embedding.key0))
-    np.maximum.at(stretches, edges.ravel(), np.repeat(ratios, 2))
-    return stretches
 
 
 def _missed_notes(fitted: FittedMap) -> list[str]:

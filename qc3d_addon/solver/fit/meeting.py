@@ -14,13 +14,12 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import Bools, Floats
-from ..collision.box_tree import CrowdedError
-from ..collision.crossings import crossing_pairs
 from ..keys.embedding import Embedding
 from ..support.progress import told
 from ..tets.mesh import TetMesh
 from .continuation import FollowedPath, follow_path
 from .fold_free import LANDMARK_WEIGHT
+from .own_crossings import crossing_vertices
 from .stiff_landmarks import StiffFitter
 
 MET = 1e-4  # of the diagonal: a vertex is met if its distance is at most this
@@ -55,11 +54,12 @@ def meet_keys(
     float
         The fraction that is done, in [0, 1].
     """
-    base = _weights(embedding)
+    crossing = crossing_vertices(embedding)
+    base = _weights(embedding, crossing)
     fitter = StiffFitter(mesh, landmarks, _WEIGHT_ON_THE_WAY / LANDMARK_WEIGHT * base)
     followed = yield from told(follow_path(fitter, targets), lambda part: 0.6 * part)
     diagonal = embedding.pair.diagonal * embedding.scale
-    reachable = ~crossing_vertices(embedding)
+    reachable = ~crossing
     mapped, weights, before = followed.maps[-1], base, len(reachable)
     schedule = [*_WEIGHTS, *[_WEIGHTS[-1]] * _MORE_ROUNDS]
     for number, weight in enumerate(schedule):
@@ -78,24 +78,7 @@ def meet_keys(
     return followed.ending_with(mesh, mapped)
 
 
-def crossing_vertices(embedding: Embedding) -> Bools:
-    """(n,) whether a vertex belongs to triangles that cross in either key, or to their neighbors.
-
-    No fold-free map meets both keys there. True for all vertices if too many triangles overlap to be examined.
-    """
-    faces = embedding.pair.welded_faces
-    found = np.zeros(len(embedding.key0), dtype=bool)
-    for key in (embedding.key0, embedding.key1):
-        try:
-            crossing = crossing_pairs(key, faces)
-        except CrowdedError:
-            return np.ones(len(found), dtype=bool)
-        found[faces[crossing.ravel()].ravel()] = True
-    found[faces[found[faces].any(axis=1)].ravel()] = True
-    return found
-
-
-def _weights(embedding: Embedding) -> Floats:
+def _weights(embedding: Embedding, crossing: Bools) -> Floats:
     """(n,) weights of the vertices, with sum 1.
 
     They are inverse to the areas around vertices, as the stiffness of tetrahedra of equal weights is to the squares of
@@ -103,5 +86,5 @@ def _weights(embedding: Embedding) -> Floats:
     """
     lengths = np.sqrt(embedding.weights)
     lengths = np.maximum(lengths, _LEAST_LENGTH * lengths.mean())
-    weights = np.where(crossing_vertices(embedding), _WEIGHT_AT_CROSSINGS, 1.0) / lengths**2
+    weights = np.where(crossing, _WEIGHT_AT_CROSSINGS, 1.0) / lengths**2
     return np.asarray(weights / weights.sum())

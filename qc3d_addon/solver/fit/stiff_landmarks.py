@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fold-free maps with landmark weights that are so large that the landmarks are met.
 
-Three things make this possible. All tetrahedra have the same weight, whatever their volumes: then small ones, as around
+Three things make this possible. Tetrahedra have the same weight, whatever their volumes: then small ones, as around
 fingers, move nearly rigidly, and large ones yield (Stein, Tezduyar & Benney 2003, *Mesh moving techniques for
 fluid-structure interactions with large displacements*). With volumes as weights, small tetrahedra beside a part that
 moves far are squashed at once, and hold up all others. Conjugate gradients are preconditioned by a factored matrix that
@@ -43,11 +43,19 @@ class StiffFitter(FoldFreeFitter):
     mesh : TetMesh
     landmarks : (n, N) sparse array
     weights : (n,)
+    insideness : (M,), optional
+        How far inside an object each tetrahedron is, from 0 to 1. Inside, weights are as the volumes then, so that an
+        object that grows does so evenly; outside, they are all the same.
     """
 
-    def __init__(self, mesh: TetMesh, landmarks: csr_array, weights: Floats) -> None:
+    def __init__(
+        self, mesh: TetMesh, landmarks: csr_array, weights: Floats, insideness: Floats | None = None
+    ) -> None:
         super().__init__(mesh, landmarks, weights)
-        self._tet_weights = np.full(len(mesh.tets), 1.0 / len(mesh.tets))
+        inside = np.zeros(len(mesh.tets)) if insideness is None else insideness
+        volumes = inside * mesh.volumes
+        by_volume = volumes * (inside.sum() / max(float(volumes.sum()), np.finfo(np.float64).tiny))
+        self._tet_weights = (by_volume + 1.0 - inside) / len(mesh.tets)
         pattern = self._pattern.assemble(np.ones((len(mesh.tets), 4, 4)))
         self._order = elimination_order(mesh.points, pattern)
         self._rank = np.argsort(self._order)
@@ -58,10 +66,15 @@ class StiffFitter(FoldFreeFitter):
 
     def with_weights(self, weights: Floats) -> StiffFitter:
         """A fitter of the same mesh to the same landmarks with other weights (n,)."""
-        other = copy.copy(self)
+        other = self.anew()
         other._weights = weights
         other._landmark_matrix = csr_array(self.landmarks.T @ diags_array(weights) @ self.landmarks)
         other._landmark_blocks = other._blocks_of(other._landmark_matrix)
+        return other
+
+    def anew(self) -> StiffFitter:
+        """A fitter of the same mesh to the same landmarks: factors are kept from step to step, but not between fits."""
+        other = copy.copy(self)
         other._forget_factors()
         return other
 

@@ -19,8 +19,11 @@ from ..settings import FitOptions
 from ..tets.mesh import TetMesh
 from ..tets.point_location import interpolation_matrix
 from ..triangles.winding_number import insideness, winding_numbers
-from .fold_free import FoldFreeFitter
 from .lattice import mesh_on_lattice
+from .stiff_landmarks import StiffFitter
+
+# Landmarks pull so hard that what is missed is what the tetrahedra cannot follow; more only makes some of them thin.
+_LANDMARK_SHARE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,28 +60,29 @@ class Volume:
     search: CrossingSearch | None = None
 
     @classmethod
-    def filled(
-        cls, embedding: Embedding, options: FitOptions, cube: Cube | None = None, stretches: Floats | None = None
-    ) -> Volume:
+    def filled(cls, embedding: Embedding, options: FitOptions, cube: Cube | None = None) -> Volume:
         """Fill the cube around the first key of an embedded pair.
+
+        The tetrahedra follow the motion to the second key, unless they serve other second keys too.
 
         Parameters
         ----------
         embedding : Embedding
         options : FitOptions
         cube : Cube, optional
-            The cube of the embedding, if it is not that of this pair alone.
-        stretches : (n,), optional
-            How many times longer the edges at each vertex become, for the quality ``exact``.
+            The cube of the embedding, if it is not that of this pair alone; the second key then makes no difference.
 
         Raises
         ------
         MeshingError
             If the chosen engine cannot fill it.
         """
-        key0, faces = embedding.key0, embedding.pair.faces
-        points = key0 if options.quality == "exact" else in_single_precision(key0)
-        made = fill_cube(points, faces, options, stretches, 1.0 if cube is None else 1.0 / ROOM)
+        key0, key1, faces = embedding.key0, embedding.key1, embedding.pair.faces
+        points, moved = (key0, key1) if options.quality == "exact" else map(in_single_precision, (key0, key1))
+        if cube is None:
+            made = fill_cube(points, faces, options, moved)
+        else:
+            made = fill_cube(points, faces, options, size=1.0 / ROOM)
         return cls(mesh_on_lattice(made.mesh), made.engine, key0, faces, embedding.weights, made.notes, cube)
 
     @cached_property
@@ -107,14 +111,15 @@ class Volume:
         return csr_array(diags_array(1.0 / totals) @ self.landmarks), around
 
     @cached_property
-    def fitter(self) -> FoldFreeFitter:
-        """Fits maps of the mesh to second keys.
+    def fitter(self) -> StiffFitter:
+        """Fits maps of the mesh to second keys; each fit needs its own, made by ``anew``.
 
         A fit takes a few hundred steps, each of which makes differences grow. What differs by rounding only, such as
         keys that were moved, must lead to the same map: hence single precision.
         """
         rounded = in_single_precision(self.key0)
-        return FoldFreeFitter(self.mesh, interpolation_matrix(self.mesh, rounded), in_single_precision(self.weights))
+        weights, inside = in_single_precision(_LANDMARK_SHARE * self.weights), in_single_precision(self.insideness)
+        return StiffFitter(self.mesh, interpolation_matrix(self.mesh, rounded), weights, inside)
 
 
 def in_single_precision(values: Floats) -> Floats:

@@ -42,7 +42,7 @@ class FilledCube:
 
 
 def fill_cube(
-    points: Floats, faces: Ints, options: FitOptions, stretches: Floats | None = None, size: float = 1.0
+    points: Floats, faces: Ints, options: FitOptions, moved: Floats | None = None, size: float = 1.0
 ) -> FilledCube:
     """Fill the unit cube with tetrahedra, finest near a surface.
 
@@ -57,8 +57,8 @@ def fill_cube(
         Triangles; they may be open, non-manifold, crossing or degenerate, and there may be none.
     options : FitOptions
         Its quality, engine, seed and time limit.
-    stretches : (n,), optional
-        How many times longer the edges at each vertex are in the second key; quality ``exact`` is finer there.
+    moved : (n, 3), optional
+        The vertices of the second key, in the same cube. The engine delaunay is finer where the motion asks for it.
     size : float
         Size of the surface, beside its size where it fills the cube: samples on it are as many, and so much closer.
         Without effect on the quality ``exact``, which follows the vertices.
@@ -72,7 +72,7 @@ def fill_cube(
     points, faces = np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     _require_usable(points, faces)
     if options.quality == "exact":
-        mesh = vertex_mesh(points, faces, options.seed, stretches)
+        mesh = vertex_mesh(points, faces, options.seed, moved)
         require_filled_cube(mesh)
         return FilledCube(mesh, "delaunay", ())
     resolution = RESOLUTIONS[options.quality].scaled(size).beside(points, faces)
@@ -88,7 +88,7 @@ def fill_cube(
             if options.engine == "tetwild":
                 raise
             notes.append(f"The cube was filled by the engine delaunay. {error}")
-    mesh = delaunay_mesh(points, faces, resolution, options)
+    mesh = delaunay_mesh(points, faces, resolution, options, moved)
     require_filled_cube(mesh)
     return FilledCube(mesh, "delaunay", tuple(notes))
 

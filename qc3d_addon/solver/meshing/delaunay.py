@@ -9,12 +9,18 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..settings import FitOptions
 from ..tets.mesh import TetMesh
+from .motion_sizes import MotionSizes
 from .poisson_disk import Resolution, sample_cube, sample_surface
 from .published_samples import Discarding, sample_cube_as_published
-from .slivers import sliver_free
+from .slivers import Effort, sliver_free
+
+# Tetrahedra grow fast away from the surface: more smoothing would only even this out.
+_EFFORT = Effort(sweeps=3, rounds=20)
 
 
-def delaunay_mesh(points: Floats, faces: Ints, resolution: Resolution, options: FitOptions) -> TetMesh:
+def delaunay_mesh(
+    points: Floats, faces: Ints, resolution: Resolution, options: FitOptions, moved: Floats | None = None
+) -> TetMesh:
     """Fill the cube. Deterministic: the same input and seed give the same mesh.
 
     Parameters
@@ -27,11 +33,14 @@ def delaunay_mesh(points: Floats, faces: Ints, resolution: Resolution, options: 
         Target distances between samples.
     options : FitOptions
         Its seed, and which samples are taken.
+    moved : (n, 3), optional
+        The second key in the same cube: tetrahedra are smaller where the motion asks for it.
     """
     rng = np.random.default_rng(options.seed)
-    surface = sample_surface(points, faces, resolution.spacing, rng)
     if options.sampling == "published":
+        surface = sample_surface(points, faces, resolution.spacing, rng)
         discarding = Discarding(resolution.spacing, options.threshold, options.sparsity)
         return sliver_free(sample_cube_as_published(surface, discarding, rng), discarding.around(surface), rng)
-    size = resolution.around(surface)
-    return sliver_free(sample_cube(surface, size, rng), size, rng)
+    size = MotionSizes.of(points, faces, moved, resolution, rng)
+    surface = sample_surface(points, faces, size.finest, rng, size)
+    return sliver_free(sample_cube(surface, size, rng), size, rng, _EFFORT)

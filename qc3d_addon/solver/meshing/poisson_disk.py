@@ -128,8 +128,13 @@ def thin(candidates: Floats, radii: Floats, kept: Floats | None = None) -> Bools
     return chosen
 
 
-def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) -> Floats:
-    """(k, 3) Poisson-disk samples of triangles (m, 3) and of vertices (n, 3), at least ``spacing`` apart."""
+def sample_surface(
+    points: Floats, faces: Ints, spacing: float, rng: Generator, size: SizeField | None = None
+) -> Floats:
+    """(k, 3) Poisson-disk samples of triangles (m, 3) and of vertices (n, 3), at least ``spacing`` apart.
+
+    If a ``size`` is given, they are apart by its value at each place, which must be at least the spacing.
+    """
     corners = points[faces]
     sizes = areas(points, faces)
     total = float(sizes.sum())
@@ -139,11 +144,17 @@ def sample_surface(points: Floats, faces: Ints, spacing: float, rng: Generator) 
         triangle = rng.choice(len(faces), size=count, p=sizes / total)
         weights = rng.dirichlet((1.0, 1.0, 1.0), size=count)
         samples = np.einsum("nk,nka->na", weights, corners[triangle])
-        samples = samples[thin(samples, np.full(count, spacing))]
+        if size is not None:
+            samples = samples[rng.random(count) < (spacing / size(samples)) ** 2]
+        samples = samples[thin(samples, _radii(samples, spacing, size))]
     vertices = rng.permutation(points)
     vertices = vertices[without_piles(vertices, _NEIGHBORS)]
-    apart: Floats = vertices[thin(vertices, np.full(len(vertices), spacing), samples)]
+    apart: Floats = vertices[thin(vertices, _radii(vertices, spacing, size), samples)]
     return np.concatenate([samples, apart])
+
+
+def _radii(positions: Floats, spacing: float, size: SizeField | None) -> Floats:
+    return np.full(len(positions), spacing) if size is None else size(positions)
 
 
 def sample_cube(surface: Floats, size: SizeField, rng: Generator, widest_cell: float = np.inf) -> Floats:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Floats, Ints
 from ..tets.mesh import TetMesh
 from ..triangles.geometry import areas
-from ..triangles.topology import without_piles
+from ..triangles.topology import sides, without_piles
 from .poisson_disk import RESOLUTIONS, SizeField, sample_cube, thin
 from .slivers import Effort, sliver_free
 
@@ -30,12 +30,13 @@ _APART = 0.6  # vertices nearer than this part of the local distance share a sam
 # Samples lie beside the vertices, by this part of the local distance: the four corners of every quad would make a flat
 # tetrahedron otherwise.
 _BESIDE = 0.15
+_LEAST_EDGE = 1e-6  # cube units: shorter edges have no stretch that can be told
 _OVERSAMPLING = 4.0
 _WIDEST_CELL = 1.0
 _EFFORT = Effort(sweeps=2, rounds=6, angle=5.0)
 
 
-def vertex_mesh(points: Floats, faces: Ints, seed: int, stretches: Floats | None = None) -> TetMesh:
+def vertex_mesh(points: Floats, faces: Ints, seed: int, moved: Floats | None = None) -> TetMesh:
     """Fill the cube with Delaunay tetrahedra whose size at the surface follows the local length of edges.
 
     The same input and seed give the same mesh.
@@ -47,11 +48,11 @@ def vertex_mesh(points: Floats, faces: Ints, seed: int, stretches: Floats | None
     faces : (m, 3) int64
         Triangles, in any state; may be empty.
     seed : int
-    stretches : (n,), optional
-        How many times longer the edges at each vertex are in the second key.
+    moved : (n, 3), optional
+        The vertices of the second key, in the same cube: where edges become longer, tetrahedra are smaller.
     """
     rng = np.random.default_rng(seed)
-    size = size_around(points, np.ones(len(points)) if stretches is None else stretches)
+    size = size_around(points, np.ones(len(points)) if moved is None else _stretches(points, moved, faces))
     vertices = rng.permutation(points[without_piles(points, 2)])
     vertices = vertices[thin(vertices, _APART * size(vertices))]
     surface = np.concatenate([vertices, _between(vertices, points, faces, size, rng)])
@@ -85,6 +86,16 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
         return np.minimum(graded, coarsest, dtype=np.float64)
 
     return size
+
+
+def _stretches(points: Floats, moved: Floats, faces: Ints) -> Floats:
+    """(n,) how many times longer the edges at each vertex become: the largest ratio."""
+    edges = sides(faces)
+    before, after = (np.linalg.norm(shape[edges[:, 1]] - shape[edges[:, 0]], axis=1) for shape in (points, moved))
+    ratios = after / np.maximum(before, _LEAST_EDGE)
+    stretches = np.zeros(len(points))
+    np.maximum.at(stretches, edges.ravel(), np.repeat(ratios, 2))
+    return stretches
 
 
 def _between(vertices: Floats, points: Floats, faces: Ints, size: SizeField, rng: np.random.Generator) -> Floats:

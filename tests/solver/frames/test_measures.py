@@ -46,7 +46,7 @@ def test_a_sphere_that_grows_and_turns() -> None:
     for name in ("volume", "dilatation"):
         np.testing.assert_allclose(measures[name][0], 1.0, atol=1e-5)
     # Inside, the map grows like the surface; coarse tetrahedra reach from there into the space that has to shrink.
-    assert 0.7 < np.median(measures["volume"][2]) / 1.5**3 < 1.05
+    assert 0.65 < np.median(measures["volume"][2]) / 1.5**3 < 1.05
     assert np.median(measures["dilatation"][2]) < 1.5
 
 

@@ -57,6 +57,7 @@ def test_it_fills_the_cube() -> None:
         fill_cube(points, faces, FitOptions(sampling="published", sparsity=sparsity)).mesh for sparsity in (10.0, 30.0)
     )
     assert len(sparse.points) < 0.7 * len(dense.points)
+    # Samples are discarded at random, which leaves gaps that no rearrangement of a few rounds closes.
     assert smallest_dihedral_angles(dense).min() > 4.0
     same = fill_cube(points, faces, FitOptions(sampling="published", sparsity=10.0)).mesh
     np.testing.assert_array_equal(dense.points, same.points)

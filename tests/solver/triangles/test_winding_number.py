@@ -9,7 +9,8 @@ import pytest
 
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.triangles import winding_number
-from qc3d_addon.solver.triangles.winding_number import winding_numbers
+from qc3d_addon.solver.triangles.geometry import face_normals
+from qc3d_addon.solver.triangles.winding_number import exact_winding_numbers, winding_numbers
 
 from ..meshes import box_surface, icosphere
 
@@ -136,3 +137,14 @@ def test_each_query_on_its_own_gives_the_same() -> None:
     queries = np.random.default_rng(3).uniform(size=(150, 3))
     alone = [winding_numbers(BALL, BALL_FACES, query[None])[0] for query in queries[::10]]
     np.testing.assert_allclose(winding_numbers(BALL, BALL_FACES, queries)[::10], alone, rtol=0.0, atol=1e-12)
+
+
+def test_exact_numbers_close_to_the_surface_and_on_it() -> None:
+    points, faces = icosphere(1, 1.0)
+    middles, normals = points[faces].mean(axis=1), face_normals(points, faces)
+    for side, expected in ((-1e-9, 1.0), (1e-9, 0.0)):
+        found = exact_winding_numbers(points, faces, middles + side * normals)
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+    on_it = exact_winding_numbers(points, faces, middles, np.arange(len(faces)))
+    np.testing.assert_allclose(on_it, 0.5, atol=1e-9)
+    np.testing.assert_allclose(exact_winding_numbers(points, faces[:, ::-1], points.mean(axis=0)[None]), -1.0)

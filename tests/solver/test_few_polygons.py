@@ -158,3 +158,16 @@ def test_what_is_flattened_is_no_worse_than_the_straight_blend() -> None:
         length = np.linalg.norm(np.diff(shape[edges], axis=1)[:, 0], axis=1) / scale
         excess = np.maximum(length / np.maximum(*lengths) - 1.0, 1.0 - length / np.minimum(*lengths))
         assert np.percentile(excess, 99) < 0.0025
+
+
+@pytest.mark.parametrize("shear", [0.25, 0.5])
+def test_a_sheared_box_keeps_the_lengths_and_the_volume_that_straight_lines_keep(shear: float) -> None:
+    key1 = BOX @ np.array([[1.0, shear, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    frames = qc3d.bake([BOX, key1], BOX_FACES, 3).frames
+    edges = unique_edges(sides(BOX_FACES))
+    lengths = np.linalg.norm(frames[:, edges[:, 1]] - frames[:, edges[:, 0]], axis=2)
+    ends = lengths[[0, -1]]
+    beyond = np.maximum(lengths / ends.max(axis=0) - 1.0, 1.0 - lengths / ends.min(axis=0))
+    assert beyond.max() < 0.0025
+    volumes = [enclosed_volume(frame, BOX_FACES) for frame in frames]
+    np.testing.assert_allclose(volumes, 1.0, rtol=0.005)

@@ -16,7 +16,9 @@ import numpy as np
 
 from ..arrays import Floats
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
+from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotations import rotation_matrices, rotation_vectors
+from ..surface.path import SurfacePath
 from .course import Course
 
 # Vertices that travel less than this part of all count most.
@@ -24,6 +26,9 @@ _CALM_PERCENTILE = 25.0
 # Of the way: where a rigid motion of the whole leaves less than this, parts of it are calm to a lesser degree only; and
 # of that, what is left by rounding.
 _MOSTLY_RIGID, _EXACTLY_RIGID = 0.2, 1e-5
+# Calm parts that turn by less than the first between the keys tell how a frame is turned, and not beyond the second: of
+# what turns far about a spine that is still, straight lines tell no turn.
+_TURNS_LITTLE, _TURNS_FAR = np.radians(45.0), np.radians(90.0)
 # Steps of the alignment; frames are a few degrees away, and each step leaves the third power of the angle.
 _STEPS = 3
 # Of the moments of inertia: what lies in a line is not turned about it.
@@ -73,9 +78,9 @@ class RigidMove:
             rotation = rotation_matrices(np.linalg.solve(inertia, moment)[None])[0] @ rotation
         return cls(rotation_vectors(rotation[None])[0], center, shift)
 
-    def scaled(self, part: float) -> RigidMove:
-        """A part, 0..1, of the motion."""
-        return RigidMove(part * self.turn, self.center, part * self.shift)
+    def scaled(self, part: float, turning: float = 1.0) -> RigidMove:
+        """A part, 0..1, of the motion, and of the rotation only the part ``turning``, 0..1, of that."""
+        return RigidMove(part * turning * self.turn, self.center, part * self.shift)
 
     def apply(self, points: Floats) -> Floats:
         """Points (k, 3), carried along."""
@@ -100,18 +105,21 @@ class CalmAlignment:
     Parameters
     ----------
     embedding : Embedding
+    surface : SurfacePath
+        How the surface turns between the keys.
     turns : bool
         Whether there are full turns that the keys cannot tell: straight lines then tell nothing of the way, and nothing
         is placed.
     """
 
-    def __init__(self, embedding: Embedding, turns: bool = False) -> None:
+    def __init__(self, embedding: Embedding, surface: SurfacePath, turns: bool = False) -> None:
         self._embedding = embedding
         self._inner = (False, False)
         self._part = 0.0 if turns else _calm_part(embedding)
         self._course: Course | None = None
         self._led = 0.0
         self._weights = _weights(_calmness(embedding.travel), embedding)
+        self._turning = _turning_part(surface, self._weights)
 
     def beside(self, inner: tuple[bool, bool]) -> CalmAlignment:
         """The same for a pair of a chain; ``inner`` tells which of its keys lies between it and another pair."""
@@ -136,7 +144,8 @@ class CalmAlignment:
         if self._course is not None:
             target = self._course.lead(target, self._embedding, time)
         whole = RigidMove.between(shape, target, self._weights)
-        return whole.scaled(self._part * (self._led + (1.0 - self._led) * self.onset(time)))
+        onset, turning = (self._led + (1.0 - self._led) * part for part in (self.onset(time), self._turning))
+        return whole.scaled(self._part * onset, turning)
 
     def onset(self, time: float) -> float:
         """The part of a move, 0..1, at ``time``; beside inner keys of a chain it sets in without a velocity."""
@@ -156,6 +165,17 @@ def _calm_part(embedding: Embedding) -> float:
     share = min(float(np.sqrt(squares[0] / max(squares[1], 1e-300))) / _MOSTLY_RIGID, 1.0)
     part = max(share - _EXACTLY_RIGID, 0.0) / (1.0 - _EXACTLY_RIGID)
     return part * part * (3.0 - 2.0 * part)
+
+
+def _turning_part(surface: SurfacePath, weights: Floats) -> float:
+    """How much of a rotation is due, 0..1, by how far what is calm, of weights (n,), turns between the keys."""
+    deformation, turning = surface.deformation, surface.turning
+    if not len(deformation.faces):
+        return 1.0
+    calm = sums_by_label(surface.group, weights)[deformation.faces].sum(axis=1) * deformation.weights
+    angle = float(np.linalg.norm(calm @ (turning.swing + turning.twist))) / max(float(calm.sum()), 1e-300)
+    part = np.clip((_TURNS_FAR - angle) / (_TURNS_FAR - _TURNS_LITTLE), 0.0, 1.0)
+    return float(part * part * (3.0 - 2.0 * part))
 
 
 def _calmness(travel: Floats) -> Floats:

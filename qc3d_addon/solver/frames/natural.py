@@ -51,7 +51,7 @@ class NaturalFrames:
         embedding = fitted.embedding
         self._surface = fitted.surface_path
         self._spins = ExtraSpins(embedding, self._surface, fitted.options.extra_turns)
-        self._turns = turns = bool(self._spins) or not np.array_equal(self.still, embedding.still)
+        self._turns = turns = bool(self._spins) or self._surface.returns
         if fitted.options.extra_turns and not turns:
             self.notes = ("The extra turns change nothing: no part turns freely or by more than half a turn.",)
         with beside(lambda: fitted.crossings) as limit:
@@ -59,7 +59,7 @@ class NaturalFrames:
             self._volume = VolumePath(fitted.volume.system, fitted.maps, turning, fitted.options.stretch)
         self._limit = limit.result()
         self._slopes: tuple[Floats, Floats] | None = None
-        self._alignment = CalmAlignment(embedding, turns)
+        self._alignment = CalmAlignment(embedding, self._surface, turns)
         self._anchors = VolumeAnchors(fitted, self._volume)
         self._mirror_images = MirrorImages(fitted.pair)
         if self._mirror_images:
@@ -161,10 +161,6 @@ class NaturalFrames:
         order = np.argsort(np.argsort(at_keys, kind="stable"))
         volumes, positions, excess = ([found[place] for place in order] for found in (volumes, positions, excess))
         positions, crossings = yield from self._uncrossed(times, volumes, positions, excess)
-        if any(crossings):
-            embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
-            pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
-            positions, crossings = pieces.apart(self._limit, times, positions, crossings)
         moves = [self._alignment.of(shape, time) for shape, time in zip(positions, times.tolist(), strict=True)]
         held = self.still
         if any(crossings) and not self._turns:
@@ -243,10 +239,26 @@ class NaturalFrames:
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
     ) -> Generator[float, None, tuple[list[Floats], list[int | None]]]:
-        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps.
+        """Where a frame crosses itself more than the keys do, move loose pieces aside.
 
-        Returns the positions and what is left of the excess of crossings in each frame.
+        If that does not suffice, the volume's anchors win as far as that helps, before pieces move aside. Returns the
+        positions and what is left of the excess of crossings in each frame.
         """
+        if not any(excess):
+            return positions, excess
+        embedding, faces = self._fitted.embedding, self._fitted.pair.welded_faces
+        pieces = LoosePieces(embedding.key0, faces, self.components, self.still)
+        # Moving aside depends on the keys alone, and changes as little as they do; the volume's tetrahedra do not.
+        aside, left = pieces.apart(self._limit, times, positions, excess)
+        if not any(left):
+            return aside, left
+        positions, excess = yield from self._anchored(times, volumes, positions, excess)
+        return pieces.apart(self._limit, times, positions, excess)
+
+    def _anchored(
+        self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
+    ) -> Generator[float, None, tuple[list[Floats], list[int | None]]]:
+        """Where a frame crosses itself more than the keys do, let the volume's anchors win as far as that helps."""
         reach = np.zeros(len(self.still))
         for attempt in range(_UNCROSSING_ATTEMPTS):
             if not any(excess):

@@ -21,6 +21,9 @@ _MOST_SHARE = 0.5
 # Volumes below these fractions of the cubed size may be nothing but rounding: the first decides about the share of the
 # surface, the second about the parts that are counted in the report.
 _LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
+# Volumes over areas to the power of 3/2; a sphere has 0.094. What is flatter than that in a key has no inside there:
+# rounding may decide about the sign.
+_FLAT = 1e-4
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,7 @@ def reversal(pair: KeyPair) -> Reversal:
     flips, least = volumes[0] * volumes[1] < 0.0, np.abs(volumes).min(axis=0)
     surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
     full = np.abs([closed.fullness(key) for key in keys])
+    flips &= full.min(axis=0) > _FLAT
     is_real = full[1] > AS_FULL * full[0]
     is_reversed = flips & (least > _LEAST_VOLUME)
     is_part = flips & (least > _LEAST_OF_A_PART)

@@ -24,9 +24,11 @@ from .grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
 # Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
-_MOST_SWING = 1.55 * np.pi
+# Triangles count gradually from the first angle to the second.
+_MOST_SWING = 1.5 * np.pi, 1.6 * np.pi
 # Share of a part's weight that must turn further than that: a few badly shaped triangles must not decide for the part.
-_FAIR_SHARE = 0.02
+# The twist sets in gradually from the first share to the second.
+_FAIR_SHARE = 0.01, 0.03
 _DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
 # Parts that turn by less than this short of half a turn, or beyond it, have two ways of about the same length.
 _HALF_TURN = np.radians(30.0)
@@ -79,8 +81,7 @@ class Turning:
 
     def angles_from(self, rest: Floats) -> Floats:
         """(m,) angle by which each element turns relative to the rotation vector ``rest`` (3,), radians."""
-        parts = (self.swing, self.twist) if self.twist.any() else (self.swing - rest,)
-        return np.asarray(np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0))
+        return np.asarray(np.linalg.norm(self.swing + self.twist - rest, axis=1))
 
 
 def consistent_turning(
@@ -107,7 +108,8 @@ def consistent_turning(
     -----
     The rotation vector of a neighbor is moved to the branch nearest to that of the element. This works up to a full
     turn, where the axis is lost. A part of which a fair share turns by more than ``_MOST_SWING`` is therefore split
-    into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing.
+    into a twist about its principal axis, whose angle is unwrapped like a phase and has no such limit, and a swing. At
+    the limit, a part of the twist is split off, so that nothing changes at once.
 
     In each part the element that turns least takes the short way round; in a part with still vertices the one whose
     rotation is nearest to ``rest``. A part without still vertices that turns like the nearest element of the largest
@@ -130,13 +132,21 @@ def consistent_turning(
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
     phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
-    far = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1)) > _MOST_SWING
-    share = sums_by_label(forest.labels, weights * far) / sums_by_label(forest.labels, weights)
-    twists = (share > _FAIR_SHARE)[forest.labels]
-    if not twists.any():
+    farthest = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1))
+    share = sums_by_label(forest.labels, weights * _risen(farthest, *_MOST_SWING))
+    degree = _risen(share / sums_by_label(forest.labels, weights), *_FAIR_SHARE)[forest.labels]
+    if not degree.any():
         return Turning(vectors, no_twist(count))
-    twist = np.where(twists[:, None], phases[:, None] * axes, 0.0)
-    return Turning(np.where(twists[:, None], swing_beside(turns, twist), vectors), twist)
+    twist = (degree * phases)[:, None] * axes
+    swing = swing_beside(turns, twist)
+    partly = (degree < 1.0)[:, None]
+    return Turning(np.where(partly, nearest_branch(swing, (1.0 - degree)[:, None] * vectors), swing), twist)
+
+
+def _risen(values: Floats, low: float, high: float) -> Floats:
+    """0 up to ``low``, 1 from ``high`` on, rising smoothly between them."""
+    part = np.clip((values - low) / (high - low), 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))
 
 
 def no_twist(count: int) -> Floats:

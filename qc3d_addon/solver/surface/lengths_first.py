@@ -66,27 +66,38 @@ class LengthsFirst:
     def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
         """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
 
-        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse.
+        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse. As
+        far as a volume is not kept, the straight blend takes its place where its lengths are as good.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
         part = _allowed(added)
-        return np.asarray(free + part[self._labels][:, None] * (held - free))
+        shape = free + part[self._labels][:, None] * (held - free)
+        # What gives up its volume may as well go straight, where that costs no more: so does a sheared box.
+        saved = _tolerable(self._excess(straight) - self._excess(shape))
+        saved *= _tolerable(self._mean_excess(straight) - self._mean_excess(shape))
+        return np.asarray(shape + ((1.0 - part) * saved)[self._labels][:, None] * (straight - shape))
 
-    def straightened(self, shape: Floats, time: float) -> Floats:
+    def straightened(self, shape: Floats, time: float, lines: Floats) -> Floats:
         """(n, 3) a shape whose components go straighter where their own way costs lengths that the straight one keeps.
 
         Where all edges of a component keep between their key lengths in the straight blend, as those of what is
-        flattened do, it is as good a way as any. Nor may edges suffer more on average than they do there.
+        flattened do, it is as good a way as any. Nor may edges suffer more on average than they do there. The same goes
+        for the straight ``lines`` (n, 3) between the keys before the motion of the whole was taken out: those of
+        something that is sheared keep its lengths, although they turn it.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         worse = self._mean_excess(shape) - self._mean_excess(straight)
         need = np.maximum(1.0 - _allowed(worse), self._reversal)
         if self._can_go_straight.any():
             need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * self._can_go_straight)
-        if not need.any():
-            return shape
-        return np.asarray(shape + need[self._labels][:, None] * (straight - shape))
+        if need.any():
+            shape = shape + need[self._labels][:, None] * (straight - shape)
+        costs = 1.0 - _allowed(self._excess(shape))
+        if costs.any():
+            costs *= _tolerable(self._excess(lines))
+            shape = shape + costs[self._labels][:, None] * (lines - shape)
+        return shape
 
     def lost(self, shape: Floats) -> float:
         """99th percentile of how far the edges that move leave the interval between their key lengths, relative."""
@@ -122,3 +133,8 @@ def _allowed(excess: Floats) -> Floats:
     # The reduced excess is at most 4/3 of where the reduction sets in.
     beyond = np.maximum(excess / (0.75 * _MOST_EXCESS) - 1.0, 0.0)
     return np.asarray(1.0 / (1.0 + beyond**2 / (1.0 + beyond)))
+
+
+def _tolerable(excess: Floats) -> Floats:
+    """(c,) 1 where there is no excess, 0 from twice the largest on, falling gradually."""
+    return np.asarray(np.clip(1.0 - 0.5 * excess / _MOST_EXCESS, 0.0, 1.0))

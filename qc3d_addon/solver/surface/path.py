@@ -34,6 +34,7 @@ from .end_rates import (
 )
 from .joints import Joints
 from .lengths_first import SMALL_CORRECTION, LengthsFirst
+from .places import PartPlaces
 from .rigid_parts import RigidParts
 from .sweeps import Sweeps, Wanted
 from .system import MovingSurface
@@ -74,8 +75,12 @@ class SurfacePath:
     ----------
     vertices : (k,) int64
         One vertex of each group that coincides in both keys; ``deformation`` uses indices into these.
+    group : (n,) int64
+        For every vertex the one of ``vertices`` that coincides with it.
     still : (n,) bool
         Whether each vertex is still, and so stays on the straight line between the keys.
+    returns : bool
+        Whether vertices that both keys leave in place come back there after full turns.
     components : (n,) int64
         Connected component of each vertex.
     turning : Turning
@@ -97,17 +102,17 @@ class SurfacePath:
     ) -> None:
         self._law: StretchLaw = law
         self.whole_turn = embedding.motion.turn
-        self.vertices, self._group = embedding.pair.welding
+        self.vertices, self.group = embedding.pair.welding
         self._key0, key1 = embedding.key0[self.vertices], embedding.key1[self.vertices]
         self._apart = None
         if embedding.pair.nearly_coincident:
-            self._apart = [key - key[self.vertices][self._group] for key in (embedding.key0, embedding.key1)]
+            self._apart = [key - key[self.vertices][self.group] for key in (embedding.key0, embedding.key1)]
         self._embedding = embedding
         still = embedding.still[self.vertices]
         count = len(self.vertices)
         faces, (triangles, shares) = embedding.pair.faces, embedding.pair.covering
-        if count < len(self._group):
-            faces, triangles = self._group[faces], self._group[triangles]
+        if count < len(self.group):
+            faces, triangles = self.group[faces], self.group[triangles]
         self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
         usable = self.deformation
         held = still[usable.faces].any(axis=1)
@@ -120,23 +125,27 @@ class SurfacePath:
         if free_after_turns:
             returned[usable.faces[turning.angles_from(self.rest) > _RETURNS]] = True
             still &= ~returned
-        self.still = still[self._group]
+        self.returns = bool((embedding.still[self.vertices] & returned).any())
+        self.still = still[self.group]
         self._free = ~still
-        self._springs = edges_without_triangle(triangles, self._group[embedding.pair.edges], self.deformation.faces)
+        self._springs = edges_without_triangle(triangles, self.group[embedding.pair.edges], self.deformation.faces)
         self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
-        self.components = labels[self._group]
+        self.components = labels[self.group]
         owners = labels[usable.faces[:, 0]]
         flipped = np.zeros(0, dtype=np.int64) if other_way is None else other_way
         self.turning = turning.other_way(np.isin(owners, flipped))
         self.half_turned = half_turned(self.turning, usable.weights, owners, self.rest)
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
-        weights = sums_by_label(self._group, embedding.weights, count)
+        weights = sums_by_label(self.group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
         self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, self._closed.reversal(self._key0, key1))
         turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
+        self._places = PartPlaces(
+            self._key0, key1, ~self._free, weights, labels, usable.faces, usable.weights, self.turning
+        )
         self._joints = Joints(self._key0, key1, ~self._free, weights, labels, turns)
         self._rigid = RigidParts(self._key0, key1, ~self._free, weights, labels)
         area = float(self.deformation.weights.sum())
@@ -168,7 +177,7 @@ class SurfacePath:
         """The same path with anchor weights multiplied by ``factors`` (n,), each at least 1."""
         stronger = copy.copy(self)
         strongest = np.ones(len(self._key0))
-        np.maximum.at(strongest, self._group, factors)
+        np.maximum.at(strongest, self.group, factors)
         stronger._anchor_weights = self._anchor_weights * strongest
         stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
@@ -183,7 +192,7 @@ class SurfacePath:
             return self.deformation
         triangles, shares = self._embedding.pair.covering
         key1 = self._embedding.key1[self.vertices]
-        return TriangleDeformation.between(self._key0, key1, self._group[triangles], shares)
+        return TriangleDeformation.between(self._key0, key1, self.group[triangles], shares)
 
     def end_rates(self) -> tuple[Rates, Rates]:
         """Rates of rotation, stretch and volume at the first and at the second key."""
@@ -240,13 +249,14 @@ class SurfacePath:
             for shape, other in zip(costly, free, strict=True):
                 settled[shape] = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
         settled = [
-            self._lengths_first.straightened(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)
+            self._lengths_first.straightened(shape, time, self._embedding.straight(time)[self.vertices])
+            for shape, (time, _) in zip(settled, moments, strict=True)
         ]
         return [self._unwelded(shape, time) for shape, (time, _) in zip(settled, moments, strict=True)]
 
     def bends(self, shape: Floats) -> Bools:
         """(n,) the vertices of components that are congruent in both keys and that a shape (n, 3) would bend."""
-        return np.asarray(self._rigid.bent(shape[self.vertices])[self._group])
+        return np.asarray(self._rigid.bent(shape[self.vertices])[self.group])
 
     def length_excess(self, shape: Floats) -> float:
         """How far edges of a shape (n, 3) leave the interval between their key lengths: the 99th percentile of all."""
@@ -254,13 +264,14 @@ class SurfacePath:
 
     def _unwelded(self, shape: Floats, time: float) -> Floats:
         """(n, 3) positions of all vertices; coincident ones keep the tiny, interpolated offsets of their keys."""
-        positions = self._joints.closed(self._rigid.placed(shape, time), time)[self._group]
+        positions = self._joints.closed(self._rigid.placed(shape, time), time)[self.group]
         if self._apart is not None:
             positions += (1.0 - time) * self._apart[0] + time * self._apart[1]
         return positions
 
     def _wanted(self, time: float, anchor: Floats | None) -> Wanted:
         anchors = self._screws.positions(time) if anchor is None else anchor[self.vertices]
+        anchors = self._places.moved(anchors, time)
         lengths = (1.0 - time) * self._lengths[0] + time * self._lengths[1]
         volumes = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
         if self._correction is not None:

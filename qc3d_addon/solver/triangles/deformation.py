@@ -11,6 +11,7 @@ positions (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling").
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from .geometry import areas, hat_gradients, planar_jacobians, tangent_bases
 # largest coordinate. Three vertices in a line, as in a polygon with subdivided sides, make such triangles.
 _THINNEST = 1e-10
 _ROUNDING = 2.5e-7
+# Nor do those that become flatter by this factor from one key to the other, as in a mesh that is pressed flat: there a
+# millionth of the size would turn them by any angle.
+_PRESSED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +77,12 @@ class TriangleDeformation:
         What they count is multiplied by ``shares`` (m,).
         """
         double0, double1 = (2.0 * areas(key, faces) for key in (key0, key1))
-        usable = (double0 > _least_area(key0, faces, double0)) & (double1 > _least_area(key1, faces, double1))
+        longest0, longest1 = (
+            in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1)
+        )
+        usable = (double0 > _least_area(key0, double0, longest0)) & (double1 > _least_area(key1, double1, longest1))
+        flatness = np.stack([double0 * longest1**2, double1 * longest0**2])
+        usable &= flatness.min(axis=0) > _PRESSED * flatness.max(axis=0)
         faces = faces if usable.all() else faces[usable]
 
         def parts(rows: slice) -> tuple[Floats, ...]:
@@ -109,11 +118,17 @@ class TriangleDeformation:
         return replace(self.without_directions(), stretch=nothing, turns=np.empty((0, 3)), angles=np.empty(0))
 
 
-def _least_area(key: Floats, faces: Ints, double: Floats) -> Floats:
-    """(m,) bound that twice the area of a usable triangle must exceed; ``double`` (m,) is twice the areas."""
-    longest = in_blocks(lambda rows: (_longest_sides(key, faces[rows]),), len(faces))[0]
+def _least_area(key: Floats, double: Floats, longest: Floats) -> Floats:
+    """(m,) bound that twice the area of a usable triangle must exceed.
+
+    ``double`` (m,) is twice the areas, ``longest`` (m,) the longest sides.
+    """
     rounding = _ROUNDING * float(np.abs(key).max(initial=0.0))
     return np.asarray(np.maximum(_THINNEST * double.max(initial=0.0), rounding * longest))
+
+
+def _longest_among(key: Floats, faces: Ints, rows: slice) -> tuple[Floats]:
+    return (_longest_sides(key, faces[rows]),)
 
 
 def _longest_sides(key: Floats, faces: Ints) -> Floats:

@@ -16,6 +16,7 @@ from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.settings import FitOptions
 from qc3d_addon.solver.support.progress import finish
+from qc3d_addon.solver.surface.path import SurfacePath
 
 from ..baking import frames_of
 from ..meshes import bent, box_surface
@@ -60,7 +61,7 @@ class TestPlacement:
         key1[:9] = BAR[:9]
         embedding = Embedding.of(KeyPair.checked(BAR, key1, FACES))
         drifted = embedding.straight(0.5) @ rotation_matrices(np.array([[0.0, 0.02, 0.0]]))[0].T + 0.01
-        placed = CalmAlignment(embedding).of(drifted, 0.5).apply(drifted)
+        placed = CalmAlignment(embedding, SurfacePath(embedding)).of(drifted, 0.5).apply(drifted)
         still, line = embedding.still, embedding.straight(0.5)
         np.testing.assert_allclose(placed[still], line[still], rtol=0.0, atol=1e-6)
 
@@ -87,3 +88,19 @@ def test_a_chain_has_one_velocity_at_its_inner_key() -> None:
     before, key, after = frames_of(fits, [0.5 - step, 0.5, 0.5 + step]).frames
     speed = np.linalg.norm(after - before, axis=1).max() / (2.0 * step)
     assert np.linalg.norm(after - 2.0 * key + before, axis=1).max() / step < 0.06 * speed
+
+
+@pytest.mark.parametrize("angle", [120.0, 180.0])
+def test_a_page_about_its_still_spine_turns_evenly(angle: float) -> None:
+    """What is calm there turns as far as the rest: straight lines do not tell how far it is at a time."""
+    page, faces = box_surface((6, 4, 1), (1.0, 1.0, 0.01))
+    page = page - [page[:, 0].min(), 0.0, 0.005]
+    page[page[:, 0] == 0.0, 2] = 0.0
+    turned = page @ rotation_matrices(np.radians([[0.0, -angle, 0.0]]))[0].T
+    turned[page[:, 0] == 0.0] = page[page[:, 0] == 0.0]
+    fitted = finish(fit_pair(KeyPair.checked(page, turned, faces), FitOptions()))
+    frames = frames_of(fitted, [0.25, 0.5, 0.75]).frames
+    outer = page[:, 0] > 0.99
+    angles = np.degrees(np.arctan2(frames[:, outer, 2].mean(axis=1), frames[:, outer, 0].mean(axis=1)))
+    # Half a turn may go either way.
+    np.testing.assert_allclose(np.abs(angles), angle * np.array([0.25, 0.5, 0.75]), rtol=0.0, atol=1.0)

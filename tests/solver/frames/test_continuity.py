@@ -11,7 +11,7 @@ import qc3d_addon as qc3d
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 
-from ..meshes import box_surface, twisted
+from ..meshes import box_surface, icosphere, twisted
 
 pytestmark = [pytest.mark.usefixtures("coarse_volume"), pytest.mark.slow]
 
@@ -25,6 +25,16 @@ def moved_by(key0: Floats, key1: Floats, faces: Ints, seed: int) -> float:
     plain = qc3d.bake([key0, key1], faces, 3).frames
     changed = qc3d.bake([key0 + noise[0], key1 + noise[1]], faces, 3).frames
     return float(np.linalg.norm(changed - plain, axis=2).max()) / size
+
+
+def sheet() -> tuple[Floats, Ints]:
+    """A square of 8 x 4 quads in the xy plane, one side of which lies on the y axis."""
+    box, faces = box_surface((8, 4, 1), (1.0, 1.0, 1.0))
+    low = np.flatnonzero(box[:, 2] == 0.0)
+    number = np.full(len(box), -1)
+    number[low] = np.arange(len(low))
+    kept = number[faces]
+    return box[low] + [0.5, 0.0, 0.0], kept[(kept >= 0).all(axis=1)]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -59,3 +69,38 @@ def test_half_a_turn_keeps_its_way(seed: int) -> None:
     points, faces = box_surface((1, 2, 4), (0.5, 1.0, 3.0))
     turn = rotation_matrices(np.pi * np.array([[0.0, 0.6, 0.8]]))[0]
     assert moved_by(points, points @ turn.T, faces, seed) < MOST
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_loose_pieces_far_from_each_other(seed: int) -> None:
+    """Their places must not depend on the tetrahedra of the volume, which are others for every key."""
+    random = np.random.default_rng(seed)
+    box, faces = box_surface((1, 1, 1), (1.0, 0.7, 0.4))
+    places = random.uniform(0.0, 12.0, size=(25, 1, 3))
+    turns = rotation_matrices(random.normal(size=(25, 3)))
+    key0 = (box + places).reshape(-1, 3)
+    key1 = (box @ turns.transpose(0, 2, 1) + places + random.normal(size=(25, 1, 3)) - [0.0, 0.0, 9.0]).reshape(-1, 3)
+    every = (faces + len(box) * np.arange(25)[:, None, None]).reshape(-1, 3)
+    assert moved_by(key0, key1, every, seed) < MOST
+
+
+@pytest.mark.parametrize("angle", [90.0, 180.0])
+def test_a_page_about_its_still_spine(angle: float) -> None:
+    page, faces = sheet()
+    turned = page @ rotation_matrices(np.radians([[0.0, -angle, 0.0]]))[0].T
+    assert moved_by(page, turned, faces, 0) < MOST
+
+
+def test_what_is_pressed_flat() -> None:
+    """Triangles that are pressed to a line have no direction, with or without rounding."""
+    points, faces = icosphere(2, 1.0)
+    points = np.where(np.abs(points - 0.5) < 1e-9, 0.5, points)
+    flat = points * [1.0, 1.0, 0.0]
+    assert moved_by(points, flat, faces, 1) < MOST
+
+
+@pytest.mark.parametrize("turns", [0.735, 0.77])
+def test_twists_of_about_three_quarters_of_a_turn(turns: float) -> None:
+    """From there on, a part's turn is taken apart into a twist and a swing; that must not set in at once."""
+    points, faces = box_surface((2, 2, 10), (1.0, 1.0, 5.0))
+    assert moved_by(points, twisted(points, 2.0 * np.pi * turns), faces, 2) < MOST

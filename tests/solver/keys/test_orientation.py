@@ -84,3 +84,11 @@ def test_no_real_pair_is_mirrored(data_folder: Path) -> None:
             names = stored["shape_names"].tolist()
         for name in names[1:]:
             assert mirrored_share(read_pair(path, names[0], name)) < 0.1, (path, name)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_key_that_presses_the_mesh_flat_has_no_inside_to_turn_out(seed: int) -> None:
+    """Rounding decides about the sign of its volume."""
+    noise = np.random.default_rng(seed).uniform(-1e-5, 1e-5, BALL.shape)
+    assert share(BALL, BALL * [1.0, 1.0, 0.0] + noise, BALL_FACES) == 0.0
+    assert share(BALL * [1.0, 1.0, 0.0] + noise, BALL, BALL_FACES) == 0.0

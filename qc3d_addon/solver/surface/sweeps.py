@@ -105,16 +105,19 @@ class Sweeps:
     def _sweep(self, sweeps: int) -> None:
         iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
         going = np.ones(len(self._wanted), dtype=bool)
+        # Volumes are restored in the second half only: doing it earlier improves no measure.
+        first_with_volumes = sweeps // 2 + 1 if self._holds_volumes else 0
         self._move(self._corrected(True))
         for sweep in range(1, sweeps):
             present, refitted = self._moved.copy(), self._refitted()
-            # Volumes are restored in the second half only: doing it earlier improves no measure.
-            if 2 * sweep > sweeps and self._holds_volumes:
+            if self._holds_volumes and sweep >= first_with_volumes:
+                # What had converged before has not, if its volume is another one.
+                going |= sweep == first_with_volumes
                 self._note_missing()
                 refitted = self._with_volumes(refitted)
             # Acceleration would only amplify the rounding of a shape that has converged.
             going &= np.abs(refitted - present).max(axis=(0, 2)) > _SETTLED
-            if not going.any():
+            if not going.any() and sweep >= first_with_volumes:
                 break
             following = iteration.next(present, refitted)
             self._move(following if going.all() else np.where(going[:, None], following, present))

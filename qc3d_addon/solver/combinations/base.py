@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
+from ..keys.checks import require_sizes
 from ..keys.embedding import STILL_TOLERANCE
-from ..keys.keypair import KeyPair, require_sizes
+from ..keys.keypair import KeyPair
 from ..triangles.topology import sides, unique_edges, vertex_components
 
 
@@ -55,7 +56,7 @@ class KeysOnBase:
             raise InputError(f"A combination needs two keys or more, and {len(keys)} are given; choose another one.")
         self.pairs = [KeyPair.checked(base, key, faces, edges) for key in keys]
         for pair in self.pairs:
-            require_sizes(pair)
+            require_sizes(pair.key0, pair.key1)
         first = self.pairs[0]
         self.base, self.diagonal = first.key0, first.diagonal
         # Vertices are grouped if they coincide in every pair.

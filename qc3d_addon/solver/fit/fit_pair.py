@@ -10,8 +10,9 @@ from functools import partial
 import numpy as np
 
 from ..arrays import Floats
+from ..keys.checks import require_sizes
 from ..keys.embedding import Embedding
-from ..keys.keypair import KeyPair, require_sizes
+from ..keys.keypair import KeyPair
 from ..keys.orientation import require_reachable
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
@@ -54,7 +55,7 @@ def fit_pair(pair: KeyPair, options: FitOptions, shared: Volume | None = None) -
     If only parts of the mesh cannot be reached, the map stays as close as it can and a note says so; in-betweens meet
     both keys all the same.
     """
-    require_sizes(pair)
+    require_sizes(pair.key0, pair.key1)
     out_of_reach = require_reachable(pair)
     seconds: dict[str, float] = {}
     embedding = None if shared is None else Embedding.of(pair, shared.cube)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..collision.crossings import CrossingSearch
 from ..errors import QC3DError
 from ..fit.volume import Volume
+from ..keys.checks import require_sizes
 from ..keys.embedding import Cube, Embedding
-from ..keys.keypair import Ends, KeyPair, require_sizes
+from ..keys.keypair import Ends, KeyPair
 from ..settings import FitOptions
 from ..support.memory import announce, give_back
 from ..support.progress import Done
@@ -65,7 +66,7 @@ class _Base:
     def volume(self) -> Volume | None:
         """The volume around it; None if that cannot be made."""
         try:
-            require_sizes(self.pair)
+            require_sizes(self.pair.key0, self.pair.key1)
             cube = Cube.around(self.pair)
             volume = Volume.filled(Embedding.of(self.pair, cube), self.options, cube)
             alone = replace(self.pair, key1=self.pair.key0)

@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -15,15 +14,16 @@ from ..arrays import Bools, Floats, Ints
 from ..collision.colliders import CollisionResolver
 from ..collision.self_crossings import CrossingLimit
 from ..fit.fitted_map import FittedMap
-from ..support.threads import Item, Result, batches, beside, in_threads
+from ..support.threads import batches, beside, in_threads
 from ..surface.end_rates import Rates, hermite
-from ..surface.path import SWEEPS, SurfacePath
+from ..surface.path import SWEEPS
 from .alignment import CalmAlignment, RigidMove
 from .course import Course, shares_of_turns
 from .extra_turns import ExtraSpins
 from .frame import Frame
 from .loose_pieces import LoosePieces
 from .mirror_image import MirrorImages
+from .shaping import Shaping
 from .straighter import Straighter, more_than
 from .volume_anchors import VolumeAnchors
 from .volume_path import VolumePath, turning_inside
@@ -31,7 +31,6 @@ from .volume_path import VolumePath, turning_inside
 _UNCROSSING_ATTEMPTS = 3
 _HASTE = (2, 8, 8)  # of each: first nearer to the course of a chain, then nearer to the volume
 _SWEEPS_AT_KEYS = 2  # nothing is left to settle there
-_ONE_BY_ONE = 500_000  # vertices: each frame that is solved beside another takes half a kilobyte for each
 _PUSHES = 4  # how often the surface is solved again after colliders pushed vertices out
 # Factor on the anchor weights at a crossing; there, the anchors of the volume override lengths.
 _STRONGEST_ANCHOR = 1e8
@@ -66,6 +65,7 @@ class NaturalFrames:
             moment = self._anchors.of([self._volume.at(0.5)], [0.5])
             halfway = self._spins.apply(self._surface.shapes(moment)[0], 0.5)
             self._mirror_images.keep(embedding.from_cube(halfway, 0.5))
+        self._shaping = Shaping(embedding, self._spins, self._mirror_images)
 
     @property
     def still(self) -> Bools:
@@ -141,7 +141,7 @@ class NaturalFrames:
 
     def shape(self, time: float) -> Floats:
         """(n, 3) positions at ``time`` in 0..1, without resolving crossings."""
-        shape = self._shaped(self._surface, self._anchors.of([self._volume.at(time)], [time]))[0]
+        shape = self._shaping.shaped(self._surface, self._anchors.of([self._volume.at(time)], [time]))[0]
         return self._finished(shape, time, self._alignment.of(shape, time))
 
     def frames(self, times: Floats, resolver: CollisionResolver | None = None) -> Generator[float, None, list[Frame]]:
@@ -153,7 +153,7 @@ class NaturalFrames:
         at_keys = np.isin(times, (0.0, 1.0))
         few = batches(times[~at_keys].tolist(), self._surface.shapes_at_once)
         few += [times[at_keys].tolist()] if at_keys.any() else []
-        for maps, shapes, crossing in self._side_by_side(self._first_try, few):
+        for maps, shapes, crossing in self._shaping.side_by_side(self._first_try, few):
             volumes.extend(maps)
             positions.extend(shapes)
             excess.extend(crossing)
@@ -197,7 +197,7 @@ class NaturalFrames:
         maps = self._volume.maps_at(times)
         at_keys = times[0] in (0.0, 1.0)
         sweeps = _SWEEPS_AT_KEYS if at_keys else SWEEPS
-        shapes = self._shaped(self._surface, self._anchors.of(maps, times), sweeps)
+        shapes = self._shaping.shaped(self._surface, self._anchors.of(maps, times), sweeps)
         return maps, shapes, [0 if at_keys else self._limit.excess(shape) for shape in shapes]
 
     def _finished(self, shape: Floats, time: float, move: RigidMove, held: Bools | None = None) -> Floats:
@@ -211,30 +211,6 @@ class NaturalFrames:
             positions += hermite(time, *self._slopes)
         positions[held] = pair.key0[held] + time * (pair.key1 - pair.key0)[held]
         return positions
-
-    def _shaped(
-        self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]], sweeps: int = SWEEPS
-    ) -> list[Floats]:
-        """(n, 3) cube positions of a surface at each time, drawn to the anchor given with it; extra turns are added."""
-        return [
-            self._symmetric(self._spins.apply(shape, time), time)
-            for (time, _), shape in zip(moments, surface.shapes(moments, sweeps), strict=True)
-        ]
-
-    def _symmetric(self, shape: Floats, time: float) -> Floats:
-        """Cube positions (n, 3) as symmetric as the keys."""
-        if not self._mirror_images:
-            return shape
-        embedding = self._fitted.embedding
-        return embedding.to_cube(self._mirror_images.averaged(embedding.from_cube(shape, time), time), time)
-
-    def _all_shaped(self, surface: SurfacePath, moments: Sequence[tuple[float, Floats]]) -> list[Floats]:
-        few = batches(moments, surface.shapes_at_once)
-        return list(chain.from_iterable(self._side_by_side(partial(self._shaped, surface), few)))
-
-    def _side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """Results of the work on each item: in threads, or one by one where each takes very much memory."""
-        return map(work, items) if len(self.still) > _ONE_BY_ONE else in_threads(work, items)
 
     def _uncrossed(
         self, times: Floats, volumes: list[Floats], positions: list[Floats], excess: list[int | None]
@@ -269,8 +245,8 @@ class NaturalFrames:
             self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             anchored = self._anchors.aside(volumes, times.tolist(), reach, _HASTE[attempt])
-            tried = self._all_shaped(surface, anchored)
-            remaining = list(self._side_by_side(self._limit.excess, tried))
+            tried = self._shaping.all_shaped(surface, anchored)
+            remaining = list(self._shaping.side_by_side(self._limit.excess, tried))
             if CrossingLimit.left(remaining) >= CrossingLimit.left(excess):
                 if attempt == 0 and self._anchors.is_led:
                     continue
@@ -295,7 +271,7 @@ class NaturalFrames:
                 f"{'A frame has' if len(over) == 1 else f'{len(over)} frames have'} up to {max(over)} more pairs of "
                 "triangles that cross than the straight blend; mode straight has fewer there, and worse lengths.",
             )
-        shapes = [self._symmetric(shape, time) for shape, time in zip(found.shapes, moments, strict=True)]
+        shapes = [self._shaping.symmetric(shape, time) for shape, time in zip(found.shapes, moments, strict=True)]
         return shapes, found.excess, np.asarray((found.part == 1.0) & (min(onsets) == 1.0) & (self._slopes is None))
 
     def _cleared(
@@ -329,7 +305,7 @@ class NaturalFrames:
             self._surface.release()
             surface = self._surface.with_stronger_anchors(_STRONGEST_ANCHOR**reach)
             anchored = self._anchors.of(volumes, moments)
-            positions = self._all_shaped(
+            positions = self._shaping.all_shaped(
                 surface,
                 [
                     (time, np.where(reach[:, None] > 0.0, push, anchor))
@@ -337,7 +313,3 @@ class NaturalFrames:
                 ],
             )
         return positions
-
-
-def _frames(count: int) -> str:
-    return "A frame has" if count == 1 else f"{count} frames have"

@@ -18,15 +18,12 @@ from ..errors import InputError, naming_pair
 from ..settings import Mirror
 from ..triangles.polygons import covering, flat_quads
 from ..triangles.topology import sides, unique_edges, welded
+from .checks import indices, labels, lost_far_away, positions
 from .halves import MirrorPlane, Whole, mirror_planes
 
 # The names of the first and the second key of a pair.
 Ends = tuple[str, str]
 
-# Between these sizes, cubes of lengths and squares of areas stay within the range of double precision.
-_SMALLEST, LARGEST = 1e-75, 1e75
-_FARTHEST = 0.25 * float(np.finfo(np.float64).max)  # so that twice the size of a key is still a number
-_MOST_GROWTH = 1e10  # of the sizes of two keys: beyond it their common scale leaves the smaller one too few digits
 # Coincident vertices may differ by this many steps of single precision at the largest coordinate, since several
 # roundings add up; but never by more than a fraction of the key's size, however far from the origin the mesh is.
 _SINGLE_STEP = float(np.finfo(np.float32).eps)
@@ -34,8 +31,6 @@ _ROUNDING_STEPS = 8.0
 _MOST_ROUNDING = 3e-3
 # Of the size: what is less far from its place counts as there, so coincident vertices may differ by twice as much.
 _IN_PLACE = 1e-6
-# If a step of single precision exceeds this fraction of a key's size, its shape is visibly damaged.
-_COARSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,18 +85,18 @@ class KeyPair:
             If shapes disagree, a coordinate is not finite or within a factor of 4 of that, an index is out of range, or
             there are no vertices.
         """
-        first, second = (_positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
+        first, second = (positions(key, name) for key, name in ((key0, "first"), (key1, "second")))
         if first.shape != second.shape:
             raise InputError(
                 f"The keys have {len(first)} and {len(second)} vertices; both must be shapes of the same mesh."
             )
         if not len(first):
             raise InputError("The mesh has no vertices; there is nothing to move.")
-        triangles = _indices(faces, 3, len(first), "faces")
-        wires = _indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
+        triangles = indices(faces, 3, len(first), "faces")
+        wires = indices(np.empty((0, 2)) if edges is None else edges, 2, len(first), "edges")
         if polygons is None:
             return cls(first, second, triangles, wires, flat_quads([first, second], triangles))
-        return cls(first, second, triangles, wires, _labels(polygons, len(triangles)))
+        return cls(first, second, triangles, wires, labels(polygons, len(triangles)))
 
     @cached_property
     def own(self) -> KeyPair:
@@ -174,7 +169,7 @@ class KeyPair:
     @cached_property
     def far_away(self) -> str | None:
         """A sentence for the user if a key lies so far from its origin that single precision damaged its shape."""
-        error = _lost_far_away(self.key0, self.key1)
+        error = lost_far_away(self.key0, self.key1)
         return None if error is None else str(error)
 
 
@@ -240,102 +235,8 @@ def _mirrored(pairs: dict[Ends, KeyPair], mirror: Mirror | Sequence[MirrorPlane]
     return {(first, second): KeyPair(shapes[first], shapes[second], *mesh) for first, second in pairs}
 
 
-def _lost_far_away(first: Floats, second: Floats) -> InputError | None:
-    """The error that says that a key is too far from its origin for single precision; None if none is."""
-    size = max(float(np.ptp(key, axis=0).max()) for key in (first, second))
-    for key, name in ((first, "first"), (second, "second")):
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            single = key.astype(np.float32)
-            step = float(np.spacing(np.abs(single).max()))
-        if step > _COARSE * size > 0.0 and (single == key).all():
-            return InputError(
-                f"The {name} key lies so far from its origin, at {np.abs(key).max():.1e}, that single precision tells "
-                f"positions only {step:.1g} apart there, {step / size:.1%} of its size, and has lost much of its "
-                "shape; model it near the origin and move the object instead."
-            )
-    return None
-
-
-def _positions(key: ArrayLike, name: str) -> Floats:
-    try:
-        given = np.asarray(key)
-        positions = np.array(given, dtype=np.float64) if given.dtype.kind in "fiuO" else None
-    except (TypeError, ValueError, OverflowError):
-        positions = None
-    if positions is None:
-        raise InputError(f"The {name} key does not hold numbers; positions must be an (n, 3) array of them.")
-    if positions.ndim != 2 or positions.shape[1] != 3:
-        raise InputError(f"The {name} key has shape {positions.shape}; positions must be an (n, 3) array.")
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if bad.size:
-        raise InputError(
-            f"Vertex {bad[0]} of the {name} key has a coordinate that is not finite "
-            f"({bad.size} such vertices); repair the key first."
-        )
-    largest = float(np.abs(positions).max(initial=0.0))
-    if largest > _FARTHEST:
-        raise InputError(
-            f"The {name} key has coordinates up to {largest:.0e}, whose differences are no numbers; repair the key "
-            "first."
-        )
-    return positions
-
-
-def require_sizes(pair: KeyPair) -> None:
-    """Check that the computation from one key to the other stays within the range of floating point.
-
-    Raises
-    ------
-    InputError
-        If a key is too large or too small, or the keys' sizes differ by more than a factor of 1e10.
-    """
-    sizes = []
-    for key, name in ((pair.key0, "first"), (pair.key1, "second")):
-        largest = float(np.abs(key).max())
-        if largest > LARGEST:
-            raise InputError(
-                f"The {name} key has coordinates up to {largest:.0e}; scale the mesh to below {LARGEST:.0e}, or choose "
-                "the mode straight."
-            )
-        sizes.append(float(np.ptp(key, axis=0).max()))
-        if 0.0 < sizes[-1] < _SMALLEST:
-            raise InputError(
-                f"The {name} key is only {sizes[-1]:.0e} in size; scale the mesh to above {_SMALLEST:.0e}, or choose "
-                "the mode straight."
-            )
-    if min(sizes) > 0.0 and not 1.0 / _MOST_GROWTH <= sizes[1] / sizes[0] <= _MOST_GROWTH:
-        raise InputError(
-            f"The second key is {sizes[1] / sizes[0]:.0e} times as large as the first, too much for "
-            "floating point; bring both keys to similar sizes, or choose the mode straight."
-        )
-
-
 def _rounding(key: Floats) -> float:
     """How far apart coincident vertices of a key may be along an axis."""
     steps = _ROUNDING_STEPS * _SINGLE_STEP * float(np.abs(key).max(initial=0.0))
     size = float(np.ptp(key, axis=0).max(initial=0.0))
     return max(min(steps, _MOST_ROUNDING * size), 2.5 * _IN_PLACE * size)
-
-
-def _labels(values: ArrayLike, count: int) -> Ints:
-    labels = np.asarray(values)
-    if labels.shape != (count,) or (count and labels.dtype.kind not in "iu"):
-        raise InputError(
-            f"polygons has shape {labels.shape} and holds {labels.dtype} values; it must be a list of {count} whole "
-            "numbers, for each triangle that of its polygon."
-        )
-    return np.ascontiguousarray(labels, dtype=np.int64)
-
-
-def _indices(values: ArrayLike, width: int, count: int, name: str) -> Ints:
-    try:
-        indices = np.array(values)
-    except ValueError as error:
-        raise InputError(f"{name} has rows of different lengths; it must be an (m, {width}) array.") from error
-    if indices.ndim != 2 or indices.shape[1] != width:
-        raise InputError(f"{name} has shape {indices.shape}; it must be an (m, {width}) array of vertex indices.")
-    if indices.size and indices.dtype.kind not in "iu":
-        raise InputError(f"{name} holds {indices.dtype} values; vertex indices must be integers.")
-    if indices.size and (indices.min() < 0 or indices.max() >= count):
-        raise InputError(f"{name} refers to a vertex outside 0..{count - 1}.")
-    return np.ascontiguousarray(indices, dtype=np.int64)

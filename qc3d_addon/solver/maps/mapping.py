@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..errors import InputError
-from ..keys.keypair import LARGEST
+from ..keys.checks import LARGEST
 from ..numerics.rotations import determinants
 from ..tets.mesh import TetMesh, edge_matrices
 from .representation import polar_decomposition

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.keys.keypair import KeyPair, require_sizes
+from qc3d_addon.solver.keys.checks import require_sizes
+from qc3d_addon.solver.keys.keypair import KeyPair
 
 from ..meshes import icosphere
 
@@ -89,7 +90,7 @@ class TestKeyPair:
     @pytest.mark.parametrize("key1", [POINTS, POINTS * [1, 0, 1], np.zeros_like(POINTS)])
     def test_flat_keys_and_keys_in_a_point_are_taken(self, key0: np.ndarray, key1: np.ndarray) -> None:
         pair = KeyPair.checked(key0, key1, FACES)
-        require_sizes(pair)
+        require_sizes(pair.key0, pair.key1)
         assert np.isfinite(1.0 / pair.diagonal)
 
     @pytest.mark.parametrize(
@@ -103,7 +104,7 @@ class TestKeyPair:
     )
     def test_sizes_that_only_mode_straight_takes(self, key0: np.ndarray, key1: np.ndarray, sentence: str) -> None:
         with pytest.raises(InputError, match=re.escape(sentence) + ".*choose the mode straight"):
-            require_sizes(KeyPair.checked(key0, key1, FACES))
+            require_sizes(key0, key1)
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-9, 0.5])

@@ -156,6 +156,12 @@ ENTRIES = (
         "minutes",
         tables=_written("speed.md", "stages", "--growth"),
     ),
+    Entry(
+        "small",
+        (_module("stages", "--small", "--frames", "4", "--write"),),
+        "minutes",
+        tables=_written("speed.md", "stages", "--small"),
+    ),
     Entry("keys", (_module("keys", "--write"),), "minutes", tables=_written("speed.md", "keys"), needs="shapes"),
     Entry("clicks", (_module("clicks", "--write"),), "minutes", tables=_written("speed.md", "clicks")),
     Entry("fit", (_module("fit"),), "minutes", printed=(f"{SCIENCE}/speed.md",), needs="shapes"),

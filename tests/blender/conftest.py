@@ -50,7 +50,7 @@ def quick_map(monkeypatch: pytest.MonkeyPatch) -> list[FitOptions]:
     """
     calls = []
 
-    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions, *_: object) -> FilledCube:
+    def fill_cube(points: np.ndarray, faces: np.ndarray, options: FitOptions, *_: object, **__: object) -> FilledCube:
         calls.append(options)
         return six_tetrahedra()
 

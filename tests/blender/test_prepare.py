@@ -104,7 +104,7 @@ def test_prepare_makes_the_map_anew(figure: bpy.types.Object, quick_map: list[An
     assert len(quick_map) == 2
 
 
-@pytest.mark.parametrize(("version", "which"), [(-2, "an earlier"), (1, "a later")])
+@pytest.mark.parametrize(("version", "which"), [(-3, "an earlier"), (1, "a later")])
 def test_a_map_of_another_version_is_made_again_and_a_note_says_so(
     figure: bpy.types.Object, quick_map: list[Any], monkeypatch: pytest.MonkeyPatch, version: int, which: str
 ) -> None:

@@ -130,7 +130,7 @@ class NaturalFrames:
         """The same in-betweens, drawn to the course of the chain that they are part of."""
         led = copy.copy(self)
         led._anchors, led._alignment = self._anchors.along(course), self._alignment.along(course)
-        led._surface = self._surface.with_stronger_anchors(course.strength)
+        led._surface = self._surface.with_stronger_anchors(course.strength).beside_course(course.share)
         return led
 
     def with_end_slopes(self, first: Floats, second: Floats) -> NaturalFrames:

@@ -9,9 +9,12 @@ volume in between than in both keys.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..numerics.grouped_sums import means_by_label
 from ..triangles.geometry import edge_lengths
 
 # How far edges may leave the interval between their key lengths for the sake of a component's volume, relative; 99th
@@ -55,6 +58,7 @@ class LengthsFirst:
         self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
         self._reversal = reversal
+        self._straight_share = np.ones(len(reversal))
         counts = np.bincount(self._label, minlength=int(labels.max(initial=-1)) + 1)
         # Position of each component's percentile among all edges, sorted by component and excess.
         self._has_edges = np.flatnonzero(counts)
@@ -81,8 +85,14 @@ class LengthsFirst:
         shape = free + part[self._labels][:, None] * (held - free)
         # What gives up its volume may as well go straight, where that costs no more: so does a sheared box.
         saved = _tolerable(self._excess(straight) - self._excess(shape))
-        saved *= _tolerable(self._mean_excess(straight) - self._mean_excess(shape))
+        saved *= _tolerable(self._mean_excess(straight) - self._mean_excess(shape)) * self._straight_share
         return np.asarray(shape + ((1.0 - part) * saved)[self._labels][:, None] * (straight - shape))
+
+    def beside_course(self, shares: Floats) -> LengthsFirst:
+        """The same for vertices that follow another course than straight lines, as far as ``shares`` (n,) in 0..1."""
+        other = copy.copy(self)
+        other._straight_share = 1.0 - means_by_label(self._labels, shares[:, None], count=len(self._reversal))[:, 0]
+        return other
 
     def straightened(self, shape: Floats, time: float, lines: Floats) -> Floats:
         """(n, 3) a shape whose components go straighter where their own way costs lengths that the straight one keeps.
@@ -94,12 +104,13 @@ class LengthsFirst:
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         worse = self._mean_excess(shape) - self._mean_excess(straight)
-        need = np.maximum(1.0 - _allowed(worse), self._reversal)
-        if self._can_go_straight.any():
-            need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * self._can_go_straight)
+        need = np.maximum((1.0 - _allowed(worse)) * self._straight_share, self._reversal)
+        can_go_straight = self._can_go_straight * self._straight_share
+        if can_go_straight.any():
+            need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * can_go_straight)
         if need.any():
             shape = shape + need[self._labels][:, None] * (straight - shape)
-        costs = (1.0 - _allowed(self._excess(shape))) * self._can_follow_lines
+        costs = (1.0 - _allowed(self._excess(shape))) * self._can_follow_lines * self._straight_share
         if costs.any():
             costs *= _tolerable(self._excess(lines))
             shape = shape + costs[self._labels][:, None] * (lines - shape)

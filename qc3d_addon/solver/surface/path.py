@@ -183,6 +183,12 @@ class SurfacePath:
         stronger._surface = self._surface.with_anchor_weights(stronger._anchor_weights + self._line_weights)
         return stronger
 
+    def beside_course(self, shares: Floats) -> SurfacePath:
+        """The same path where vertices follow a course other than straight lines, as far as ``shares`` (n,) in 0..1."""
+        other = copy.copy(self)
+        other._lengths_first = self._lengths_first.beside_course(shares[self.vertices])
+        return other
+
     def release(self) -> None:
         """Give up, on large surfaces, memory that will be filled again when it is needed."""
         self._surface.release()

@@ -23,8 +23,9 @@ _MOST_EXCESS = 0.002
 _PERCENTILE = 0.99
 # An edge that leaves the interval by more suffers in the straight blend.
 _SUFFERS = 0.01
-# Relative volume corrections below this never cost so much: even if everything must stretch, lengths change by a third.
-SMALL_CORRECTION = 0.005
+# Relative volume corrections below the first never cost so much: even if everything must stretch, lengths change by a
+# third. From the second on they are looked at fully; in between gradually, so that motions have no corner there.
+_SMALL_CORRECTION, _LARGE_CORRECTION = 0.005, 0.01
 _SHORTEST = 1e-9  # cube units
 
 
@@ -76,17 +77,12 @@ class LengthsFirst:
     def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
         """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
 
-        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse. As
-        far as a volume is not kept, the straight blend takes its place where its lengths are as good.
+        Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
         part = _allowed(added)
-        shape = free + part[self._labels][:, None] * (held - free)
-        # What gives up its volume may as well go straight, where that costs no more: so does a sheared box.
-        saved = _tolerable(self._excess(straight) - self._excess(shape))
-        saved *= _tolerable(self._mean_excess(straight) - self._mean_excess(shape)) * self._straight_share
-        return np.asarray(shape + ((1.0 - part) * saved)[self._labels][:, None] * (straight - shape))
+        return np.asarray(free + part[self._labels][:, None] * (held - free))
 
     def beside_course(self, shares: Floats) -> LengthsFirst:
         """The same for vertices that follow another course than straight lines, as far as ``shares`` (n,) in 0..1."""
@@ -145,6 +141,12 @@ class LengthsFirst:
         )
 
 
+def onset_of_mixing(corrected: Floats) -> Floats:
+    """(q,) how far shapes are mixed, 0..1, whose volumes had to be corrected by parts (q,) of them."""
+    part = np.clip((corrected - _SMALL_CORRECTION) / (_LARGE_CORRECTION - _SMALL_CORRECTION), 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))
+
+
 def _allowed(excess: Floats) -> Floats:
     """(c,) the part, 0..1, by which an excess stays below the largest; without a corner where that sets in."""
     # The reduced excess is at most 4/3 of where the reduction sets in.
@@ -153,5 +155,6 @@ def _allowed(excess: Floats) -> Floats:
 
 
 def _tolerable(excess: Floats) -> Floats:
-    """(c,) 1 where there is no excess, 0 from twice the largest on, falling gradually."""
-    return np.asarray(np.clip(1.0 - 0.5 * excess / _MOST_EXCESS, 0.0, 1.0))
+    """(c,) 1 where there is no excess, a quarter at the largest, falling without a corner."""
+    beyond = np.maximum(excess, 0.0) / _MOST_EXCESS
+    return np.asarray(1.0 / (1.0 + beyond**2) ** 2)

@@ -33,7 +33,7 @@ from .end_rates import (
     stretch_slopes,
 )
 from .joints import Joints
-from .lengths_first import SMALL_CORRECTION, LengthsFirst
+from .lengths_first import LengthsFirst, onset_of_mixing
 from .places import PartPlaces
 from .rigid_parts import RigidParts
 from .sweeps import Sweeps, Wanted
@@ -249,12 +249,14 @@ class SurfacePath:
         wanted = [self._wanted(*moment) for moment in moments]
         work = Sweeps(self._surface, wanted)
         settled = work.settled(sweeps)
-        costly = np.flatnonzero(work.corrected > SMALL_CORRECTION).tolist()
+        onsets = onset_of_mixing(work.corrected)
+        costly = np.flatnonzero(onsets > 0.0).tolist()
         del work  # the second sweeps must not need its memory in addition
         if costly:
             free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
             for shape, other in zip(costly, free, strict=True):
-                settled[shape] = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
+                mixed = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
+                settled[shape] = settled[shape] + onsets[shape] * (mixed - settled[shape])
         settled = [
             self._lengths_first.straightened(shape, time, self._embedding.straight(time)[self.vertices])
             for shape, (time, _) in zip(settled, moments, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Floats
 from ..keys.embedding import NEARLY_STILL, STILL_TOLERANCE, Embedding
 from ..numerics.grouped_sums import sums_by_label
+from ..numerics.rising import risen
 from ..numerics.rotations import rotation_matrices, rotation_vectors
 from ..surface.path import SurfacePath
 from .course import Course
@@ -162,9 +163,8 @@ def _calm_part(embedding: Embedding) -> float:
     left = np.linalg.norm(embedding.key1 - embedding.key0, axis=1) / embedding.scale
     way = np.linalg.norm(embedding.pair.key1 - embedding.pair.key0, axis=1)
     squares = [float(embedding.weights @ distance**2) for distance in (left, way)]
-    share = min(float(np.sqrt(squares[0] / max(squares[1], 1e-300))) / _MOSTLY_RIGID, 1.0)
-    part = max(share - _EXACTLY_RIGID, 0.0) / (1.0 - _EXACTLY_RIGID)
-    return part * part * (3.0 - 2.0 * part)
+    share = float(np.sqrt(squares[0] / max(squares[1], 1e-300))) / _MOSTLY_RIGID
+    return float(risen(share, _EXACTLY_RIGID, 1.0))
 
 
 def _turning_part(surface: SurfacePath, weights: Floats) -> float:
@@ -174,8 +174,7 @@ def _turning_part(surface: SurfacePath, weights: Floats) -> float:
         return 1.0
     calm = sums_by_label(surface.group, weights)[deformation.faces].sum(axis=1) * deformation.weights
     angle = float(np.linalg.norm(calm @ (turning.swing + turning.twist))) / max(float(calm.sum()), 1e-300)
-    part = np.clip((_TURNS_FAR - angle) / (_TURNS_FAR - _TURNS_LITTLE), 0.0, 1.0)
-    return float(part * part * (3.0 - 2.0 * part))
+    return float(risen(angle, _TURNS_FAR, _TURNS_LITTLE))
 
 
 def _calmness(travel: Floats) -> Floats:

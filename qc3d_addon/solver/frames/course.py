@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..keys.embedding import Embedding
+from ..numerics.rising import risen
 from ..surface.end_rates import hermite
 
 # On the anchors of what follows the course fully: parts longer than about a seventh of the size follow it, and lengths
@@ -154,5 +155,4 @@ def shares_of_turns(angles: Floats, weights: Floats, triangles: Ints, count: int
     corners, each = triangles.ravel(), np.repeat(weights, 3)
     total = np.bincount(corners, each, count)
     mean = np.bincount(corners, each * np.repeat(angles, 3), count) / np.maximum(total, 1e-300)
-    done = np.clip((mean - _TURNS[0]) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0)
-    return np.asarray(1.0 - done * done * (3.0 - 2.0 * done))
+    return np.asarray(1.0 - risen(mean, *_TURNS))

@@ -69,8 +69,8 @@ class _Base:
             require_sizes(self.pair.key0, self.pair.key1)
             cube = Cube.around(self.pair)
             volume = Volume.filled(Embedding.of(self.pair, cube), self.options, cube)
-            alone = replace(self.pair, key1=self.pair.key0)
-            volume = replace(volume, search=CrossingSearch(alone.welded_faces, [volume.key0]))
+            resting = replace(self.pair, key1=self.pair.key0)
+            volume = replace(volume, search=CrossingSearch(resting.welded_faces, [volume.key0]))
         except QC3DError:
             return None  # each of the keys says why
         # All of it now: later, two threads might make the same.

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..numerics.rising import risen
 from ..numerics.rotation_unwrapping import mean_turn
 from ..numerics.rotations import rotation_matrices
 from ..numerics.screws import best_turns, translation_factors
@@ -248,5 +249,4 @@ def _free_part(travel: Floats, areas: Floats) -> float:
         Of the surface around the vertices.
     """
     held = float(areas @ (1.0 / (1.0 + (travel / NEARLY_STILL) ** 2))) / float(areas.sum())
-    part = min(held / _MOST_HELD, 1.0)
-    return 1.0 - part * part * (3.0 - 2.0 * part)
+    return 1.0 - float(risen(held, 0.0, _MOST_HELD))

@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 from .grouped_sums import covariances_by_label, means_by_label, sums_by_label
+from .rising import risen
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
 # Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
@@ -133,20 +134,14 @@ def consistent_turning(
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
     phases = forest.carried(2.0 * np.arctan2(sine_along, np.cos(half)), _nearest_phase)
     farthest = np.maximum(np.abs(phases), np.linalg.norm(vectors, axis=1))
-    share = sums_by_label(forest.labels, weights * _risen(farthest, *_MOST_SWING))
-    degree = _risen(share / sums_by_label(forest.labels, weights), *_FAIR_SHARE)[forest.labels]
+    share = sums_by_label(forest.labels, weights * risen(farthest, *_MOST_SWING))
+    degree = risen(share / sums_by_label(forest.labels, weights), *_FAIR_SHARE)[forest.labels]
     if not degree.any():
         return Turning(vectors, no_twist(count))
     twist = (degree * phases)[:, None] * axes
     swing = swing_beside(turns, twist)
     partly = (degree < 1.0)[:, None]
     return Turning(np.where(partly, nearest_branch(swing, (1.0 - degree)[:, None] * vectors), swing), twist)
-
-
-def _risen(values: Floats, low: float, high: float) -> Floats:
-    """0 up to ``low``, 1 from ``high`` on, rising smoothly between them."""
-    part = np.clip((values - low) / (high - low), 0.0, 1.0)
-    return np.asarray(part * part * (3.0 - 2.0 * part))
 
 
 def no_twist(count: int) -> Floats:

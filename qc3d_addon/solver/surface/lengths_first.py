@@ -15,6 +15,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..numerics.grouped_sums import means_by_label
+from ..numerics.rising import risen
 from ..triangles.geometry import edge_lengths
 
 # How far edges may leave the interval between their key lengths for the sake of a component's volume, relative; 99th
@@ -143,8 +144,7 @@ class LengthsFirst:
 
 def onset_of_mixing(corrected: Floats) -> Floats:
     """(q,) how far shapes are mixed, 0..1, whose volumes had to be corrected by parts (q,) of them."""
-    part = np.clip((corrected - _SMALL_CORRECTION) / (_LARGE_CORRECTION - _SMALL_CORRECTION), 0.0, 1.0)
-    return np.asarray(part * part * (3.0 - 2.0 * part))
+    return risen(corrected, _SMALL_CORRECTION, _LARGE_CORRECTION)
 
 
 def _allowed(excess: Floats) -> Floats:

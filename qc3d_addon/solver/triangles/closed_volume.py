@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..numerics.blocks import in_blocks
 from ..numerics.grouped_sums import sums_by_label
+from ..numerics.rising import risen
 from .geometry import areas, cross_product
 from .topology import closed_faces
 
@@ -70,8 +71,7 @@ class ClosedComponents:
         full = np.stack([self.fullness(key) for key in (key0, key1)])
         least, most = np.abs(full).min(axis=0), np.abs(full).max(axis=0)
         share = np.where(full[0] * full[1] < 0.0, least / np.maximum(most, 1e-300), 0.0)
-        part = np.minimum(share / AS_FULL, 1.0)
-        return np.asarray(part * part * (3.0 - 2.0 * part))
+        return risen(share, 0.0, AS_FULL)
 
 
 def volumes_seen_from(views: Floats, positions: Floats, faces: Ints, labels: Ints) -> Floats:

@@ -140,7 +140,7 @@ ENTRIES = (
     ),
     Entry(
         "inbetweens",
-        (("{python}", "benchmarks/inbetweens.py", "--write"),),
+        (_module("inbetweens", "--listed", "--write"),),
         "an hour",
         {f"{IMAGES}/inbetweens_{family}.png": "" for family in _FAMILIES},
         _written("inbetweens.md", "inbetweens"),

@@ -20,7 +20,7 @@ from ..tets.mesh import TetMesh
 from .compact import Boundary, Packed, from_bytes, space_of, to_bytes
 from .fields import Space
 from .files import Source, plain_bytes
-from .smallest import Wanted, largest_step, smallest
+from .smallest import Wanted, exact_size, largest_step, plain_size, smallest
 
 ChosenBoundary = Literal["auto", "sliding", "fixed", "exact"]
 
@@ -101,6 +101,8 @@ def small_maps(mesh: TetMesh, targets: Floats, error: float, boundary: ChosenBou
         field = yield from told(
             smallest(Wanted(space, moved, unit, asked)), partial(_between, start, 0.5 * (1.0 + start))
         )
+        if number and exact_size(space, field) > plain_size(Wanted(space, moved, unit, error)):
+            break  # nothing is paid for being without folds that makes a file larger than simple ones
         packed = Packed("maps", chosen, len(targets), field, exact)
         data = to_bytes(source, space, packed)
         restored = unpacked(data, source)

@@ -19,7 +19,7 @@ from ..arrays import Bools, Floats, Ints
 from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
 
-_RINGS = 2  # of tetrahedra around the folded ones
+_RINGS = (2, 3)  # of tetrahedra around the folded ones: the wider where the narrower leave folds
 _SPRINGS = (100.0, 10.0, 1.0)  # strengths, the strongest first: those that unfold leave the map nearest
 _ROUNDS, _ITERATIONS = 8, 60
 _LEAST, _SLACK = 1e-3, 0.2  # e where there are no folds, and what it is over the deepest fold
@@ -41,9 +41,9 @@ def unfolded(mesh: TetMesh, values: Floats, free: Bools) -> Floats:
     size = float(np.cbrt(max(float(np.median(determinant)), 0.0)))
     if not (determinant <= 0.0).any() or not size > 0.0:
         return values
-    place = _Place.around(mesh, values / size, determinant <= 0.0, free)
-    if len(place.mesh.tets) <= _MOST_TETS:
-        for spring in _SPRINGS:
+    for rings in _RINGS:
+        place = _Place.around(mesh, values / size, determinant <= 0.0, free, rings)
+        for spring in _SPRINGS if len(place.mesh.tets) <= _MOST_TETS else ():
             found = size * (values / size)
             found[place.vertices] = size * place.unfolded(spring)
             # Rounding may count where the place is scaled back.
@@ -79,9 +79,9 @@ class _Place:
     edge: float
 
     @classmethod
-    def around(cls, mesh: TetMesh, values: Floats, folded: Bools, free: Bools) -> _Place:
+    def around(cls, mesh: TetMesh, values: Floats, folded: Bools, free: Bools, rings: int) -> _Place:
         near = folded
-        for _ in range(_RINGS):
+        for _ in range(rings):
             near = _touching(mesh, near)[mesh.tets].any(axis=1)
         inside = ~_touching(mesh, ~near)
         vertices, corners = np.unique(mesh.tets[near], return_inverse=True)

@@ -148,7 +148,13 @@ ENTRIES = (
     ),
     Entry("clips", (_module("clips"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
     Entry("played", (_module("played"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
-    Entry("continuous", (_module("continuous"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
+    Entry(
+        "continuous",
+        (_module("continuous"), _module("continuous", "--methods")),
+        "minutes",
+        printed=(f"{SCIENCE}/inbetweens.md",),
+        needs="shapes",
+    ),
     Entry("stages", (_module("stages", "--write"),), "minutes", tables=_written("speed.md", "stages"), needs="shapes"),
     Entry(
         "growth",

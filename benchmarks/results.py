@@ -18,6 +18,8 @@ from . import classical
 from .catalogue import ROOT, Floats, Ints, Pair
 from .methods import METHODS, MODULES, OURS
 
+RESULTS = ROOT / "build/benchmarks"
+
 
 def revision() -> str:
     """The commit that is measured, with a plus sign if the working tree differs from it."""

@@ -50,7 +50,7 @@ def handles_of(points: Floats, faces: Ints) -> Ints:
     few = np.flatnonzero(np.bincount(part[handles], minlength=count) < FEWEST)
     members = [np.flatnonzero(part == number) for number in few]
     more = [rows[spread(points[rows], min(FEWEST, len(rows)))] for rows in members]
-    return np.unique(np.concatenate([handles, *more]))
+    return np.asarray(np.unique(np.concatenate([handles, *more])), dtype=np.int64)
 
 
 def spread(points: Floats, count: int) -> Ints:

@@ -72,7 +72,9 @@ def row_of_methods(pair: Pair, results: Results) -> list[str]:
         if stored is None:
             cells.append("-")
             continue
-        meeting = meetings(stored[2][:, vertices], group[checked.faces])
+        # The same lines in parts: boxes around short ways have little in common.
+        short = Weights.hats(stored[1]).played(stored[2][:, vertices], _divided(stored[1], _PARTS))
+        meeting = meetings(short, group[checked.faces])
         cells.append(str(np.count_nonzero(~own[meeting].any(axis=1))))
     return [str(pair).replace(":", " "), *cells]
 
@@ -95,12 +97,16 @@ def row(pair: Pair, parts: int) -> list[str]:
     started = clock.process_time()
     counts = []
     for weights in (Weights.hats(knots), Weights.smooth(knots)):
-        positions = np.unique(np.concatenate([*np.linspace(knots[:-1], knots[1:], parts + 1), knots]))
-        meeting = meetings(weights.played(shapes, positions)[:, vertices], group[checked.faces])
+        meeting = meetings(weights.played(shapes, _divided(knots, parts))[:, vertices], group[checked.faces])
         counts.append(own[meeting].any(axis=1))
     seconds = clock.process_time() - started
     elsewhere, at_own = ([str(np.count_nonzero(there == where)) for there in counts] for where in (False, True))
     return [str(pair).replace(":", " "), *elsewhere, *at_own, f"{seconds:.1f}"]
+
+
+def _divided(knots: Floats, parts: int) -> Floats:
+    """Positions (k,) with so many parts between every two of these (q,)."""
+    return np.unique(np.concatenate([*np.linspace(knots[:-1], knots[1:], parts + 1), knots]))
 
 
 def baked(pair: Pair, faces: Ints, first: Floats, second: Floats) -> tuple[Floats, Floats]:

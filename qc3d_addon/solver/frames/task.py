@@ -20,6 +20,7 @@ from ..fit.fitted_map import FittedMap
 from ..fit.recent import RecentFits
 from ..fit.storage import from_bytes, to_bytes
 from ..fit.volume import Volume
+from ..keys.halves import MirrorPlane
 from ..keys.keypair import Ends, KeyPair, consecutive_pairs
 from ..settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from ..support.memory import estimated_mb, require_memory
@@ -76,7 +77,7 @@ class Task:
         times: ArrayLike = (),
         collider: Collider | None = None,
         polygons: ArrayLike | None = None,
-        mirror: Mirror = "auto",
+        mirror: Mirror | Sequence[MirrorPlane] = "auto",
     ) -> Task:
         """A task from the shapes (n, 3) of the keys by name, the triangles (m, 3) and the loose edges (e, 2).
 

@@ -141,7 +141,9 @@ class SurfacePath:
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self.group, embedding.weights, count)
         covering, halfway = (triangles, shares), embedding.straight(0.5)[self.vertices]
-        self._lengths_first = LengthsFirst(self._key0, key1, covering, self._springs, labels, self._closed, halfway)
+        self._lengths_first = LengthsFirst(
+            self._key0, key1, covering, self._springs, labels, self._closed, halfway, self._free
+        )
         turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
         self._places = PartPlaces(

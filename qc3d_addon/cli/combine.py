@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import get_args
 
 from ..solver.combinations.base import KeysOnBase
 from ..solver.combinations.mirrored import combine_halves
@@ -14,7 +15,7 @@ from ..solver.errors import InputError
 from ..solver.files.atomic import replacing_all, require_writable
 from ..solver.files.npz import write_arrays
 from ..solver.keys.files import read_shapes
-from ..solver.settings import FitOptions
+from ..solver.settings import Between, FitOptions
 from ..solver.support.progress import finish
 from . import speech
 from .options import add_mirror, add_options, fit_options, print_notes
@@ -40,6 +41,13 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--weights", type=float, nargs="+", metavar="W", help="weight of each key, 0 to 1, in that order (default: 1)"
     )
     command.add_argument("--find-order", action="store_true", help="find the order of the keys instead, and print it")
+    command.add_argument(
+        "--between",
+        choices=get_args(Between),
+        default="auto",
+        help="what a key with a weight between shows: its natural in-between; or, with auto, if it is the pose of one "
+        "joint by linear blend skinning, the pose with the joint turned as far (default: auto)",
+    )
     add_mirror(command)
     command.add_argument("--output", type=Path, required=True, metavar="OUT.npz", help="faces (m, 3), shape (n, 3)")
     add_options(command, FitOptions)
@@ -57,7 +65,8 @@ def _run(arguments: argparse.Namespace) -> None:
     keys = KeysOnBase(shapes[arguments.rest], [shapes[name] for name in names], faces)
     order = None if arguments.find_order else range(len(names))
     with StageBars() as bars:
-        made = finish(combine_halves(keys, arguments.mirror, arguments.weights, order, options), bars)
+        work = combine_halves(keys, arguments.mirror, arguments.weights, order, options, arguments.between)
+        made = finish(work, bars)
     with replacing_all(arguments.output) as (output,):
         write_arrays(output, {"faces": keys.pairs[0].faces, "shape": made.shape})
     if arguments.find_order:

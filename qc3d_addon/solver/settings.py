@@ -19,6 +19,7 @@ Quality = Literal["normal", "fine", "finest", "exact"]
 StretchLaw = Literal["linear", "logarithmic"]
 Mirror = Literal["auto", "none", "x", "y", "z", "xy", "xz", "yz", "xyz"]
 WeightKind = Literal["smooth", "hats"]
+Between = Literal["auto", "natural"]
 
 # Frames between every two keys that a tolerance chooses from.
 DENSE_STEPS = 48

@@ -33,7 +33,7 @@ from .frames.many import Run
 from .frames.task import Outcome, Task
 from .frames.together import PlacedMesh, Together
 from .keys.keypair import KeyPair, consecutive_pairs
-from .settings import Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
+from .settings import Between, Easing, FitChoices, FitOptions, FrameOptions, Mirror, Mode
 from .support.memory import machine_limit_mb
 from .support.progress import OnProgress, Progress, Steps, finish
 from .triangles.polygons import flat_quads
@@ -176,12 +176,13 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    between: Between = "auto",
     mirror: Mirror = "auto",
     **options: Unpack[FitChoices],
 ) -> Work[Combination]:
     """The combination of several keys, step by step; see :func:`.api.combine` for the parameters."""
     given = KeysOnBase(base, keys, faces, edges)
-    return Work(mirrored.combine_halves(given, mirror, weights, order, FitOptions(**options)))
+    return Work(mirrored.combine_halves(given, mirror, weights, order, FitOptions(**options), between))
 
 
 def bake_together(

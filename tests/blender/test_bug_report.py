@@ -93,6 +93,18 @@ def test_a_file_with_the_shapes_only_where_asked_for(figure: bpy.types.Object, t
     np.testing.assert_array_equal(pair.key1, mesh_data.key_coordinates(figure, "Lean"))
 
 
+def test_a_half_comes_back_as_the_whole(figure: bpy.types.Object, tmp_path: Path) -> None:
+    figure.qc3d.from_key, figure.qc3d.to_key = "Basis", "Lean"
+    figure.modifiers.new("Mirror", "MIRROR")
+    path = tmp_path / "report.zip"
+    assert bpy.ops.qc3d.save_report(filepath=str(path), with_shapes=True) == {'FINISHED'}
+    task = read_bug_report(path).task
+    assert task is not None
+    ((pair,), (baked,)) = task.pairs.values(), mesh_data.read_pairs(figure, ("Basis", "Lean")).values()
+    assert pair.planes == baked.planes
+    np.testing.assert_array_equal(pair.key1, baked.key1)
+
+
 def test_a_file_is_written_where_nothing_can_be_baked(figure: bpy.types.Object, tmp_path: Path) -> None:
     path = tmp_path / "report.zip"
     figure.qc3d.from_key = figure.qc3d.to_key = "Basis"

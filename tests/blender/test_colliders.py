@@ -48,6 +48,19 @@ def volume(points: np.ndarray, faces: np.ndarray) -> float:
     return float((a * np.cross(b, c)).sum() / 6.0)
 
 
+def test_hidden_ones_count_as_if_they_were_shown(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
+    ball.modifiers.new("Smooth", "SUBSURF")
+    ball.hide_viewport = True
+    ball.location.x += 1.0
+    bpy.context.view_layer.update()
+    hidden = read(figure)
+    ball.hide_viewport = False
+    bpy.context.view_layer.update()
+    shown = read(figure)
+    assert len(hidden.shapes[0]) > len(ball.data.vertices)
+    np.testing.assert_array_equal(hidden.shapes, shown.shapes)
+
+
 def test_seen_from_the_object(figure: bpy.types.Object, ball: bpy.types.Object) -> None:
     figure.location, figure.scale = (1.0, 0.0, 0.0), (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()

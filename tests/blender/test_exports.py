@@ -311,6 +311,36 @@ def test_everything_is_as_it_was(
     assert state() == before
 
 
+@pytest.mark.parametrize("how", ["in views", "in this view layer"])
+def test_a_hidden_object_is_exported_and_stays_hidden(
+    how: str, played: bpy.types.Object, shown: Shown, tmp_path: Path
+) -> None:
+    truth = motion(played, shown)
+    in_views = how == "in views"
+    played.hide_viewport = in_views
+    played.hide_set(not in_views)
+    bpy.context.view_layer.update()
+    for ending in (".fbx", ".glb"):
+        export(played, tmp_path / f"figure{ending}")
+    export(played, tmp_path / "figure.usda")
+    assert largest_distance(read_usd(tmp_path / "figure.usda")[1], truth, "hidden") < STRAIGHT_PARTS
+    assert (played.hide_viewport, played.hide_get()) == (in_views, not in_views)
+    assert bpy.ops.qc3d.export_alembic(filepath=str(tmp_path / "figure.abc"), frames=2) == {"FINISHED"}
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "figure.abc"), as_background_job=False)
+    assert [obj.type for obj in bpy.context.selected_objects] == ["MESH"]
+
+
+def test_an_object_in_a_hidden_collection_is_refused(played: bpy.types.Object, tmp_path: Path) -> None:
+    hidden = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    hidden.objects.link(played)
+    bpy.context.scene.collection.objects.unlink(played)
+    hidden.hide_viewport = True
+    with pytest.raises(InputError, match="'Figure' is in a hidden collection; show the collection first"):
+        export(played, tmp_path / "figure.usda")
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_was_sculpted_since_goes_along(played: bpy.types.Object, tmp_path: Path) -> None:
     between = played.data.shape_keys.key_blocks["Lean_50"]
     values = np.empty(3 * len(between.points), dtype=np.float32)

@@ -125,12 +125,25 @@ def test_vertices_near_the_plane_stay_as_near(shown: Shown) -> None:
 
 def test_what_mirrors_nothing_is_left_out() -> None:
     obj = half("X")
+    whole = [np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]])]
     modifier = mirrored(obj, use_bisect_axis=[True, False, False])
-    assert not mirror_planes(obj)
+    assert not mirror_planes(obj, whole)  # cut in two by the modifier
     modifier.use_bisect_axis = [False] * 3
-    assert len(mirror_planes(obj)) == 1
+    assert len(mirror_planes(obj, whole)) == 1
     modifier.show_viewport = False
-    assert not mirror_planes(obj)
+    assert len(mirror_planes(obj, whole)) == 1  # in renders
+    modifier.show_render = False
+    assert not mirror_planes(obj, whole)
+
+
+@pytest.mark.parametrize("choices", [{"use_bisect_axis": (True, False, False)}, {"show_viewport": False}])
+def test_a_half_that_is_also_cut_or_shown_in_renders_only(shown: Shown, choices: dict[str, object]) -> None:
+    """Where the whole mesh is on one side, nothing is cut off; and seams in renders stay shut too."""
+    obj = half("X")
+    modifier = mirrored(obj, **choices)
+    bake()
+    modifier.show_viewport = True
+    assert len({len(shown(obj, **{SLIDER: place})) for place in PLACES}) == 1
 
 
 def test_a_mirror_object_without_size_is_refused() -> None:
@@ -140,7 +153,7 @@ def test_a_mirror_object_without_size_is_refused() -> None:
     empty.scale = (0.0, 1.0, 1.0)
     mirrored(obj, mirror_object=empty)
     with pytest.raises(InputError, match=r"'Flat' has the scale 0"):
-        mirror_planes(obj)
+        mirror_planes(obj, [])
 
 
 def test_quads_are_read_as_faces() -> None:

@@ -10,9 +10,13 @@ import bpy
 import numpy as np
 import pytest
 
+from qc3d_addon.blender.combinations import verdicts
+from qc3d_addon.blender.keys.sides import sides_of
+
 from .conftest import add_key, coordinates
 
 State = Callable[[], dict[str, object]]
+Shown = Callable[..., np.ndarray]
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -35,6 +39,34 @@ def head(moved: int = 0, bump: float = 0.0) -> bpy.types.Object:
     add_key(obj, "Wink.L", lambda _: basis + np.maximum(rest[:, :1], 0.0) ** 2 * [0.2, 0.1, 0.4])
     add_key(obj, "Smile", lambda _: basis + rest[:, :1] ** 2 * [0.0, 0.3, 0.2])
     return obj
+
+
+def grin() -> bpy.types.Object:
+    """The ball with one key, Grin, that turns both sides upward."""
+    obj = head()
+    for name in ("Wink.L", "Smile"):
+        obj.shape_key_remove(obj.data.shape_keys.key_blocks[name])
+    rest = basis_of(obj)
+    turned = np.abs(rest[:, 0])
+    shape = np.stack([np.sign(rest[:, 0]) * np.sin(turned), rest[:, 1], rest[:, 2] + 1.0 - np.cos(turned)], axis=1)
+    add_key(obj, "Grin", lambda _: shape)
+    return obj
+
+
+def difference(obj: bpy.types.Object, shown: Shown) -> float:
+    """Largest distance of both sides together from the whole key, at values from 0 to 1."""
+    keys = obj.data.shape_keys.key_blocks
+    found = []
+    for value in np.linspace(0.0, 1.0, 9):
+        shapes = []
+        for names in (("Grin",), ("Grin.L", "Grin.R")):
+            for name in names:
+                keys[name].value = value
+            shapes.append(shown(obj).copy())
+            for name in names:
+                keys[name].value = 0.0
+        found.append(float(np.abs(shapes[0] - shapes[1]).max()))
+    return max(found)
 
 
 def mirrored(obj: bpy.types.Object, **choices: object) -> np.ndarray:
@@ -103,6 +135,40 @@ class TestSplit:
         assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Smile.L", count=2, mode="linear") == {'FINISHED'}
         assert bpy.ops.qc3d.mirror() == {'FINISHED'}
         assert {"Smile.L_33", "Smile.R_33"} <= set(keys.keys())
+
+    @pytest.mark.parametrize("order", ["split last", "split first"])
+    def test_the_in_betweens_of_the_sides_add_up_too(self, order: str, shown: Shown) -> None:
+        """Baked by themselves, the sides would turn less where they fade into each other than both together."""
+        obj = grin()
+        keys = obj.data.shape_keys.key_blocks
+        if order == "split first":
+            assert bpy.ops.qc3d.split_key(key="Grin", falloff=0.8) == {'FINISHED'}
+            assert bpy.ops.qc3d.bake_keys(count=3) == {'FINISHED'}
+        else:
+            assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Grin", count=3) == {'FINISHED'}
+        before = difference(obj, shown) if order == "split first" else 1.0
+        assert bpy.ops.qc3d.split_key(key="Grin", falloff=0.8) == {'FINISHED'}
+        assert difference(obj, shown) < 1e-6 < 1e-4 < before
+        assert {"Grin.L_50", "Grin.R_50"} <= set(keys.keys())
+        # The left side does not move on the right, and they are left alone as long as nothing changes.
+        rest = basis_of(obj)
+        assert np.array_equal(coordinates(keys["Grin.L_50"])[rest[:, 0] < -0.8], rest[rest[:, 0] < -0.8])
+        half_way = coordinates(keys["Grin.L_50"])
+        bpy.ops.qc3d.bake_keys(count=3)
+        assert np.array_equal(coordinates(keys["Grin.L_50"]), half_way)
+
+    def test_sides_of_a_key_need_no_combination(self, state: State) -> None:
+        obj = grin()
+        bpy.ops.qc3d.split_key(key="Grin", falloff=0.8)
+        before = state()
+        with pytest.raises(RuntimeError, match=r"'Grin\.R' add up to 'Grin', so there is nothing to correct"):
+            bpy.ops.qc3d.combine_keys(first="Grin.L", second="Grin.R")
+        assert state() == before
+        bpy.ops.qc3d.judge_pairs()
+        texts = {frozenset((one.outer, one.inner)): one.text for one in verdicts.found(obj)}
+        assert texts[frozenset(("Grin.L", "Grin.R"))].startswith("adding is right")
+        assert sides_of(obj, "Grin") == ("Grin.L", "Grin.R")
+        assert sides_of(obj, "Grin.L") is None
 
     @pytest.mark.parametrize(
         ("key", "problem"),

@@ -12,8 +12,11 @@ import bpy
 import numpy as np
 import pytest
 
+from qc3d_addon.blender.bake.request import BakeRequest
+from qc3d_addon.blender.bake.run import bake_objects_together
 from qc3d_addon.blender.store.records import Record
 from qc3d_addon.cli import main
+from qc3d_addon.solver.settings import FrameOptions
 
 from .conftest import add_key
 
@@ -68,6 +71,23 @@ def apart(figure: bpy.types.Object, hat: bpy.types.Object, shown: Shown) -> floa
 def bake(**choices: object) -> None:
     found = bpy.ops.qc3d.bake_objects(from_key="Basis", to_key="Lean", count=3, **choices)
     assert found == {'FINISHED'}
+
+
+def test_hidden_objects_are_where_they_belong(
+    figure: bpy.types.Object, hat: bpy.types.Object, shown: Shown
+) -> None:
+    """Blender leaves hidden ones where they were last seen: at the origin, where a file was opened."""
+    hat.hide_viewport = True
+    figure.location.x += 2.0
+    hat.location.x += 2.0
+    before = len(bpy.data.objects)
+    bake_objects_together([figure, hat], BakeRequest(("Basis", "Lean"), 3, frame_options=FrameOptions("straight")))
+    assert len(bpy.data.objects) == before
+    hat.hide_viewport = False
+    for value in (0.0, 0.3, 1.0):
+        figure.data.shape_keys.key_blocks["Lean"].value = value
+        bpy.context.view_layer.update()
+        assert apart(figure, hat, shown) < 1e-5
 
 
 @pytest.mark.parametrize("play_on", ["key", "slider"])

@@ -53,10 +53,18 @@ def test_the_order_is_found_and_said(shapes_file: Path, tmp_path: Path, capsys: 
 
 def test_weights(shapes_file: Path, tmp_path: Path) -> None:
     output = tmp_path / "half.npz"
-    assert combine(shapes_file, output, "--weights", "0.5", "0") == 0
+    assert combine(shapes_file, output, "--weights", "0.5", "0", "--between", "natural") == 0
     with np.load(output) as stored, np.load(shapes_file) as given:
         off = np.abs(stored["shape"] - posed(given["V0"], 40.0, 0.0)).max()
         assert 0.0 < off < 0.2 * np.abs(0.5 * (given["V0"] + given["V1"]) - posed(given["V0"], 40.0, 0.0)).max()
+
+
+def test_joints_turn_by_their_weights(shapes_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "halves.npz"
+    assert combine(shapes_file, output, "--weights", "0.5", "0.5") == 0
+    with np.load(output) as stored, np.load(shapes_file) as given:
+        np.testing.assert_allclose(stored["shape"], posed(given["V0"], 40.0, 45.0, SIDE), atol=1e-6)
+    assert "pose of one joint" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import pytest
 from qc3d_addon.cli import main
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames.bug_reports import read_bug_report, write_bug_report
+from qc3d_addon.solver.keys.halves import MirrorPlane
 from qc3d_addon.solver.settings import FitOptions, FrameOptions, PlayOptions
 
 OPTIONS = (FitOptions(seed=3), FrameOptions(mode="straight"), PlayOptions(count=2))
@@ -106,6 +108,45 @@ def test_without_shapes_there_is_nothing_to_bake(tmp_path: Path, capsys: pytest.
     ],
 )
 def test_damaged_files_are_refused(report: Path, change: Callable[[dict[str, bytes]], None], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        read_bug_report(changed(report, change))
+
+
+def test_mirror_planes_come_back(bar: dict[str, np.ndarray], tmp_path: Path) -> None:
+    """What a Mirror modifier completes is completed again, across the same plane and not one that is guessed."""
+    path = tmp_path / "report.zip"
+    mesh = {"faces": bar["faces"], "edges": np.empty((0, 2), dtype=np.int32)}
+    shapes = {"a": bar["V0"], "b": bar["V1"]}
+    plane = MirrorPlane((0.0, 0.6, 0.8), (0.0, 0.6, 0.8), 0.25, 1e-3)
+    write_bug_report(path, "", "1.0.0", ("a", "b"), OPTIONS, mesh, shapes, [plane])
+    task = read_bug_report(path).task
+    assert task is not None
+    pair = task.pairs["1", "2"]
+    assert pair.planes == (plane,)
+    assert len(pair.key0) == 2 * len(bar["V0"])
+    write_bug_report(path, "", "1.0.0", ("a", "b"), OPTIONS, mesh, shapes)
+    without = read_bug_report(path).task
+    assert without is not None
+    assert not without.pairs["1", "2"].planes
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        (np.zeros((1, 7)), "make no sense"),
+        (np.zeros((7, 8)), "make no sense"),
+        (np.full((1, 8), np.nan), "make no sense"),
+        (np.zeros((1, 8)), "mirrors nothing"),
+    ],
+)
+def test_planes_that_mirror_nothing_are_refused(report: Path, rows: np.ndarray, sentence: str) -> None:
+    def change(entries: dict[str, bytes]) -> None:
+        with np.load(io.BytesIO(entries["shapes.npz"])) as stored:
+            arrays = {**stored, "planes": rows}
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays)
+        entries["shapes.npz"] = buffer.getvalue()
+
     with pytest.raises(InputError, match=sentence):
         read_bug_report(changed(report, change))
 

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ...solver.arrays import Floats
 from ...solver.errors import InputError
 from .. import compat
 from ..keys import chain_keys, drivers
 from ..keys.control import Control
 from ..kinds import keys_of, present
 from ..store import checks
+from ..store.evaluation import world_matrices
 from ..store.records import Record
 from .plan import Plan, plan_bake, write_bake
 from .request import BakeRequest, BakeResult
@@ -72,9 +74,10 @@ def plan_together(objects: Sequence[bpy.types.Object], request: BakeRequest) -> 
             plans.append(plan_bake(obj, request))
         except InputError as error:
             raise InputError(f"'{obj.name}' cannot be baked with the others. {error}") from error
-    seen_from = np.linalg.inv(_matrix(objects[0]))
+    matrices = _matrices(objects)
+    seen_from = np.linalg.inv(matrices[0])
     placed = [
-        PlacedMesh(plan.task.pairs, seen_from @ _matrix(obj)) for plan, obj in zip(plans, objects, strict=True)
+        PlacedMesh(plan.task.pairs, seen_from @ matrix) for plan, matrix in zip(plans, matrices, strict=True)
     ]
     together = Together(placed)
     first = plans[0].task
@@ -146,8 +149,9 @@ def _control(plan: Plan) -> Control:
     return chain_keys.control_of(obj, record.chains[-1])
 
 
-def _matrix(obj: bpy.types.Object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
-        raise InputError(f"'{obj.name}' has the scale 0 along an axis; set another scale.")
-    return matrix
+def _matrices(objects: Sequence[bpy.types.Object]) -> list[Floats]:
+    matrices = world_matrices(objects)
+    for obj, matrix in zip(objects, matrices, strict=True):
+        if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
+            raise InputError(f"'{obj.name}' has the scale 0 along an axis; set another scale.")
+    return matrices

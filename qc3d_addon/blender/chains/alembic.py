@@ -38,6 +38,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
         undo.callback(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
         undo.callback(_select, layer, set(context.selected_objects or ()), layer.objects.active)
         copy = copied(obj, undo)
+        copy.hide_viewport = copy.hide_render = False
         collection = bpy.data.collections.new("QC3D export")
         undo.callback(bpy.data.collections.remove, collection)
         scene.collection.children.link(collection)
@@ -53,6 +54,7 @@ def export_alembic(context: bpy.types.Context, obj: bpy.types.Object, chain: Cha
                     present(driven.driver).variables[0].targets[0].id = copy
         curve = compat.ensure_fcurve(played.owner, control.path, undo)
         slider.set_keyframes(curve, [(1.0, 0.0), (float(frames), 1.0)])
+        layer.update()  # only what it knows to be shown can be selected
         _select(layer, {copy}, copy)
         require_room(path, _largest_size(context, copy, frames))
         with replacing(path) as unfinished:

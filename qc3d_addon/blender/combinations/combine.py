@@ -19,6 +19,7 @@ from .. import compat
 from ..bake.plan import located
 from ..keys import shape_keys
 from ..keys.control import mute_path, value_path
+from ..keys.sides import whole_of
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys, names
 from ..store.combined_keys import Combined
@@ -247,6 +248,12 @@ def _require(obj: bpy.types.Object, chosen: Sequence[str]) -> None:
         raise InputError(f"The keys are relative to different ones, {' and '.join(sorted(bases))}; choose others.")
     if combined_keys.names_made(keys) & set(chosen):
         raise InputError("One of the keys corrects others itself; choose those that it corrects.")
+    whole = whole_of(obj, chosen)
+    if whole is not None:
+        raise InputError(
+            f"'{chosen[0]}' and '{chosen[1]}' add up to '{whole}', so there is nothing to correct; Split Key Left and "
+            "Right gives them its in-betweens."
+        )
 
 
 def _require_unlocked(keys: bpy.types.Key, names_: Sequence[str] | set[str]) -> None:

@@ -25,4 +25,4 @@ def completed(obj: bpy.types.Object, shapes: Sequence[Floats]) -> MirroredShapes
 
     mesh = mesh_of(obj)
     faces, edges, owners = (part.astype(np.int64) for part in (triangles(mesh), wire_edges(mesh), polygons(mesh)))
-    return MirroredShapes(shapes, faces, edges, owners, mirror_planes(obj))
+    return MirroredShapes(shapes, faces, edges, owners, mirror_planes(obj, shapes))

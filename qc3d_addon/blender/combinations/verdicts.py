@@ -12,6 +12,7 @@ import bpy
 
 from ...solver.errors import InputError
 from ..bake.many import bakeable_keys
+from ..keys.sides import whole_of
 from ..kinds import keys_of, mesh_of
 from ..store import checks
 from ..store.mesh_data import key_coordinates, shown_coordinates, triangles, wire_edges
@@ -73,11 +74,11 @@ def judge(obj: bpy.types.Object | None) -> Iterator[float]:
         shapes = KeysOnBase(start, whole, triangles(mesh_of(obj)), wire_edges(mesh_of(obj)))
         for verdict in verdicts(shapes):
             inner = verdict.second if verdict.outer == verdict.first else verdict.first
-            results.append(
-                PairVerdict(
-                    names[verdict.outer], names[inner], verdict.adding_is_right, verdict.distance, verdict.text
-                )
-            )
+            pair = names[verdict.outer], names[inner]
+            is_right, text = verdict.adding_is_right, verdict.text
+            if not is_right and (of_both := whole_of(obj, pair)) is not None:
+                is_right, text = True, f"adding is right: they are the sides of {of_both}"
+            results.append(PairVerdict(*pair, is_right, verdict.distance, text))
             yield len(results) / every
     _found[keys.session_uid] = sorted(results, key=lambda one: (one.adding_is_right, -one.distance))
 

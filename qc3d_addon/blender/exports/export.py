@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import bpy
@@ -206,14 +206,27 @@ def _alone(obj: bpy.types.Object) -> Iterator[None]:
         together.add(above)
         above = above.parent
     selected, active = set(present(bpy.context.selected_objects)), layer.objects.active
-    hidden = [one for one in together if one.name not in layer.objects]
-    if hidden:
-        raise InputError(f"'{hidden[0].name}' is not in this view layer; enable its collection first.")
-    try:
+    with ExitStack() as undo:
+        undo.callback(_select, layer, selected, active)
+        for one in together:
+            if one.name not in layer.objects:
+                raise InputError(f"'{one.name}' is not in this view layer; enable its collection first.")
+            _show(one, undo)
+        layer.update()  # only what it knows to be shown can be selected
         _select(layer, together, obj)
         yield
-    finally:
-        _select(layer, selected, active)
+
+
+def _show(one: bpy.types.Object, undo: ExitStack) -> None:
+    """Show a hidden object until ``undo`` is closed; raises InputError if its collection is hidden."""
+    if one.visible_get():
+        return
+    undo.callback(one.hide_set, one.hide_get())
+    undo.callback(setattr, one, "hide_viewport", one.hide_viewport)
+    one.hide_viewport = False
+    one.hide_set(False)
+    if not one.visible_get():
+        raise InputError(f"'{one.name}' is in a hidden collection; show the collection first.")
 
 
 def _select(layer: bpy.types.ViewLayer, objects: set[bpy.types.Object], active: bpy.types.Object | None) -> None:

@@ -27,7 +27,11 @@ from ..kinds import keys_of, mesh_of, present, shape_keys_of
 from ..preferences import limits
 from ..properties import ObjectSettings, bake_request, panel_keys, settings_of
 from ..store import mesh_data, records
+from ..store.mirror_modifiers import mirror_planes
 from .common import Status, last_error, report_error
+
+if TYPE_CHECKING:
+    from ...solver.keys.halves import MirrorPlane
 
 _PACKAGE = Path(__file__).parents[2]
 _MORE_SETTINGS = ("count", "use_tolerance", "tolerance", "play_on", "use_keyframes", "frame_start", "frame_end")
@@ -112,14 +116,16 @@ def save_report(context: bpy.types.Context, path: Path, with_shapes: bool) -> No
         except QC3DError as error:
             text += f"\nThe settings cannot be used: {without_names(str(error))}\n"
     mesh = shapes = None
+    planes: tuple[MirrorPlane, ...] = ()
     if with_shapes:
         if obj is None or not through:
             raise InputError("There are no shape keys to include; choose an object with two keys, or leave them out.")
         mesh, shapes = mesh_data.arrays_of(mesh_of(obj)), {
             name: mesh_data.shown_coordinates(obj, name) for name in dict.fromkeys(through)
         }
+        planes = mirror_planes(obj, list(shapes.values()))
     with replacing(path) as place:
-        write_bug_report(place, text, version(), through, options, mesh, shapes)
+        write_bug_report(place, text, version(), through, options, mesh, shapes, planes)
 
 
 def report_text(context: bpy.types.Context) -> str:

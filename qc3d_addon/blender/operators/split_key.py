@@ -10,9 +10,14 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 
 from ...solver.errors import QC3DError
+from ..chains.split_sides import split_in_betweens
+from ..keys import chain_keys
+from ..keys.sides import sides_of
 from ..keys.split import split_key
+from ..kinds import keys_of
 from ..store import checks
-from .common import Status, poll_active_object, report_error
+from ..store.records import Record
+from .common import Status, end_previews, poll_active_object, report_error
 
 
 class QC3D_OT_split_key(bpy.types.Operator):
@@ -47,9 +52,29 @@ class QC3D_OT_split_key(bpy.types.Operator):
             obj = checks.require_object(context.active_object)
             active = obj.active_shape_key
             name = self.key or (active.name if active is not None else "")
-            made = split_key(obj, name, self.falloff)
+            *notes, done = self._split(obj, name)
         except QC3DError as error:
             report_error(self, str(error))
             return {'CANCELLED'}
-        self.report({'INFO'}, f"'{name}' was split into '{made[0]}' and '{made[1]}'.")
+        for note in notes:
+            self.report({'WARNING'}, note)
+        self.report({'INFO'}, done)
         return {'FINISHED'}
+
+    def _split(self, obj: bpy.types.Object, name: str) -> list[str]:
+        """Split a key, or only its in-betweens if it has keys for its sides; the last sentence says what was done."""
+        keys = keys_of(obj)
+        checks.require_keys(keys, [name])
+        record = Record.read(keys)
+        chain = record.chain_on_key(name)
+        if chain is None:
+            made = split_key(obj, name, self.falloff)
+            return [f"'{name}' was split into '{made[0]}' and '{made[1]}'."]
+        end_previews()
+        chain_keys.all_owned_keys(keys, chain)  # refused before anything is changed
+        sides = sides_of(obj, name)
+        both = sides or split_key(obj, name, self.falloff)
+        notes = split_in_betweens(obj, record, chain, both)
+        what = "The in-betweens of " if sides else ""
+        how = "" if sides else ", with its in-betweens"
+        return [*notes, f"{what}'{name}' {'were' if sides else 'was'} split into '{both[0]}' and '{both[1]}'{how}."]

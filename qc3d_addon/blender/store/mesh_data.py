@@ -36,7 +36,7 @@ def read_pairs(obj: bpy.types.Object, names: Sequence[str], base: str = "") -> d
     checks.require_keys(keys_of(obj), names)
     coordinates = {name: key_coordinates(obj, name) if name == base else shown_coordinates(obj, name) for name in names}
     mesh = mesh_of(obj)
-    planes = mirror_planes(obj)
+    planes = mirror_planes(obj, list(coordinates.values()))
     return consecutive_pairs(coordinates, triangles(mesh), wire_edges(mesh), names, polygons(mesh), planes)
 
 

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from .evaluation import world_matrices
 
 if TYPE_CHECKING:
     from ...solver.keys.halves import MirrorPlane
@@ -18,35 +21,56 @@ if TYPE_CHECKING:
 _ON_PLANE = 1e-6
 
 
-def mirror_planes(obj: bpy.types.Object) -> tuple[MirrorPlane, ...]:
-    """The planes of the Mirror modifiers that the viewport shows, in the object's own space, in their order.
+def mirror_planes(obj: bpy.types.Object, shapes: Sequence[NDArray[Any]]) -> tuple[MirrorPlane, ...]:
+    """The planes of the Mirror modifiers that views or renders show, in the object's own space, in their order.
 
-    Bisected axes are left out: the modifier cuts off the other side, so the mesh itself has more than one half.
+    On bisected axes the modifier cuts off what is on the other side. Such a plane is left out if some of the mesh is
+    there: the mesh itself has more than one half.
+
+    Parameters
+    ----------
+    obj
+    shapes
+        Shapes (n, 3) of the object's mesh.
 
     Raises
     ------
     InputError
         If an object has the scale 0 along an axis, so that it has no mirror plane.
     """
+    size = max((float(np.ptp(shape, axis=0).max(initial=0.0)) for shape in shapes if len(shape)), default=0.0)
     planes = []
-    for modifier in obj.modifiers:
-        if isinstance(modifier, bpy.types.MirrorModifier) and modifier.show_viewport:
-            axes: tuple[Any, Any] = (modifier.use_axis, modifier.use_bisect_axis)  # no arrays to read in 5.2's stubs
-            chosen = zip(*axes, strict=True)
-            for axis, (is_mirrored, is_bisected) in enumerate(chosen):
-                if is_mirrored and not is_bisected:
-                    planes.append(_plane(obj, modifier, axis))
+    for modifier, axis, is_bisected in _mirrored_axes(obj):
+        plane = _plane(obj, modifier, axis, size)
+        if not is_bisected or _is_on_one_side(plane, shapes, max(plane.reach, modifier.bisect_threshold)):
+            planes.append(plane)
     return tuple(planes)
 
 
-def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int) -> MirrorPlane:
+def _mirrored_axes(obj: bpy.types.Object) -> Iterator[tuple[bpy.types.MirrorModifier, int, bool]]:
+    """Each Mirror modifier with each of its axes, and whether it cuts the mesh there."""
+    for modifier in obj.modifiers:
+        if isinstance(modifier, bpy.types.MirrorModifier) and (modifier.show_viewport or modifier.show_render):
+            axes: tuple[Any, Any] = (modifier.use_axis, modifier.use_bisect_axis)  # no arrays to read in 5.2's stubs
+            chosen = zip(*axes, strict=True)
+            for axis, (is_mirrored, is_bisected) in enumerate(chosen):
+                if is_mirrored:
+                    yield modifier, axis, is_bisected
+
+
+def _is_on_one_side(plane: MirrorPlane, shapes: Sequence[NDArray[Any]], slack: float) -> bool:
+    heights = np.concatenate([plane.heights(shape) for shape in shapes])
+    return bool(heights.min(initial=0.0) >= -slack or heights.max(initial=0.0) <= slack)
+
+
+def _plane(obj: bpy.types.Object, modifier: bpy.types.MirrorModifier, axis: int, size: float) -> MirrorPlane:
     from ...solver.keys.halves import MirrorPlane
 
     # A vertex is merged with its image if their distance, twice that from the plane, is below the threshold.
-    reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * max(obj.dimensions[:])
+    reach = 0.5 * modifier.merge_threshold if modifier.use_mirror_merge else _ON_PLANE * size
     if modifier.mirror_object is None:
         return MirrorPlane.across(axis, reach)
-    own, other = (np.array(shown.matrix_world, dtype=np.float64) for shown in (obj, modifier.mirror_object))
+    own, other = world_matrices([obj, modifier.mirror_object])
     try:
         seen = np.linalg.inv(own) @ other
         normal = np.linalg.inv(seen)[axis, :3]

@@ -13,7 +13,7 @@ from .. import steps
 from ..combinations.base import KeysOnBase
 from ..combinations.combine import Combination
 from ..combinations.verdicts import Verdict, verdicts
-from ..settings import FitChoices, Mirror
+from ..settings import Between, FitChoices, Mirror
 from ..support.progress import OnProgress
 
 
@@ -25,6 +25,7 @@ def combine(
     *,
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
+    between: Between = "auto",
     mirror: Mirror = "auto",
     progress: OnProgress | None = None,
     **options: Unpack[FitChoices],
@@ -40,10 +41,13 @@ def combine(
     faces, edges
         See ``fit``.
     weights : sequence of float, optional
-        Weight of each key, 0..1; all 1 by default. Each weight between 0 and 1 needs a fit.
+        Weight of each key, 0..1; all 1 by default.
     order : sequence of int, optional
         Indices of the keys, outermost first: the motion of a key happens inside those before it. By default, the outer
         of two keys is the one that turns more where the other bends.
+    between : Between
+        What a key with a weight between 0 and 1 shows: its ``natural`` in-between, which needs a fit; or, with
+        ``auto``, if the key is the pose of one joint by linear blend skinning, the pose with the joint turned as far.
     mirror : Mirror
         See ``fit``: of a half mesh, the mirrored whole is combined, and its seam stays on the plane.
     progress : callable
@@ -66,7 +70,9 @@ def combine(
     >>> qc3d.combine(corners, [turned, longer], faces).shape[1].round(6) + 0.0  # the sum has (1, 1, 0)
     array([0., 2., 0.])
     """
-    work = steps.combine(base, keys, faces, edges, weights=weights, order=order, mirror=mirror, **options)
+    work = steps.combine(
+        base, keys, faces, edges, weights=weights, order=order, between=between, mirror=mirror, **options
+    )
     return work.run(progress)
 
 

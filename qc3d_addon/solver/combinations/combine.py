@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real
@@ -59,6 +59,7 @@ def combine(
     weights: Sequence[float] | None = None,
     order: Sequence[int] | None = None,
     options: FitOptions | None = None,
+    shown: Mapping[int, Floats] | None = None,
 ) -> Steps[Combination]:
     """Combine several keys, each at its weight.
 
@@ -67,11 +68,13 @@ def combine(
     keys : KeysOnBase
     weights : sequence of float, optional
         Weight of each key, 0..1; all 1 by default. A key with a weight between shows its natural in-between, for which
-        a map is fitted.
+        a map is fitted, unless ``shown`` tells what it shows.
     order : sequence of int, optional
         Indices of the keys, outermost first; by default found from what they turn and bend.
     options : FitOptions, optional
         Options of the fits.
+    shown : mapping of int to (n, 3), optional
+        What some of the keys show at their weights, by their indices.
 
     Raises
     ------
@@ -82,13 +85,14 @@ def combine(
         If the volume of a key with a weight between 0 and 1 cannot be filled.
     """
     chosen = FitOptions() if options is None else options
-    values = _checked_weights(weights, len(keys.pairs))
+    values = checked_weights(weights, len(keys.pairs))
     through = outermost_first(keys) if order is None else _checked_order(order, len(keys.pairs))
-    partly = [number for number, value in enumerate(values) if 0.0 < value < 1.0]
+    known = {} if shown is None else shown
+    partly = [number for number, value in enumerate(values) if 0.0 < value < 1.0 and number not in known]
     if limit := machine_limit_mb():
         needed = estimated_mb(len(keys.base), len(partly) + 1, 1, chosen.quality, True, len(keys.faces))
         require_memory(needed, limit, len(keys.base))
-    alone = {number: keys.pairs[number].key1 for number, value in enumerate(values) if value == 1.0}
+    alone = {number: keys.pairs[number].key1 for number, value in enumerate(values) if value == 1.0} | dict(known)
     fits: dict[int, FittedMap] = {}
     for done, number in enumerate(partly):
         fits[number] = yield from numbered(fit_pair(keys.pairs[number], chosen), done, len(partly))
@@ -154,7 +158,8 @@ def _sharing(fits: int, number: int, step: Progress) -> Progress:
     return Progress("frames", (number + step.overall) / (fits + 1), fits, fits)
 
 
-def _checked_weights(weights: Sequence[float] | None, count: int) -> list[float]:
+def checked_weights(weights: Sequence[float] | None, count: int) -> list[float]:
+    """The weights of so many keys, 1 if none are given; raises InputError if the number or one of them is wrong."""
     values = [1.0] * count if weights is None else list(weights)
     if len(values) != count:
         raise InputError(f"There are {count} keys and {len(values)} weights; give one for each.")

@@ -6,7 +6,7 @@
 |---|---|
 | report.md | the text, for people |
 | settings.json | ``format`` 1, ``version`` of QC3D, ``keys``, and the options ``fit``, ``frame``, ``play`` |
-| shapes.npz | if it was asked for: ``faces``, ``edges``, ``polygons``, ``shape_names``, ``V0``, ``V1``, … |
+| shapes.npz | if asked for: ``faces``, ``edges``, ``polygons``, ``shape_names``, ``V0``, ``V1``, …, and ``planes`` |
 
 Keys are called by their numbers, 1, 2 and so on; no name of the user's is in the file.
 """
@@ -28,12 +28,15 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files.npz import MOST_BYTES, Archive, require_file, unreadable, write_arrays
 from ..keys.files import NEEDED, shapes_in
-from ..settings import FitOptions, FrameOptions, PlayOptions
+from ..keys.halves import MirrorPlane
+from ..settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from .modes import needs_fits
 from .task import Task
 
 _FORMAT = 1
 _MOST_TEXT, _MOST_KEYS = 2**20, 64
+_MOST_PLANES = 6  # the whole has 2^6 times the vertices: two modifiers with all axes
+_NUMBERS_OF_PLANE = 8  # normal, direction, offset and reach
 _TEXT, _SETTINGS, _SHAPES = "report.md", "settings.json", "shapes.npz"
 
 
@@ -64,6 +67,7 @@ def write_bug_report(
     options: tuple[FitOptions, FrameOptions, PlayOptions],
     mesh: Mapping[str, NDArray[Any]] | None = None,
     shapes: Mapping[str, NDArray[Any]] | None = None,
+    planes: Sequence[MirrorPlane] = (),
 ) -> None:
     """Write a report. Nothing of the mesh is checked: a report of what cannot be used must be possible too.
 
@@ -81,6 +85,8 @@ def write_bug_report(
         ``faces`` (m, 3), ``edges`` (e, 2) of no face, and ``polygons`` (m,) of the faces.
     shapes : dict, optional
         Positions (n, 3) by the names of the keys; without both, no shapes are in the file.
+    planes : sequence of MirrorPlane
+        Planes across which the mesh is mirrored.
 
     Raises
     ------
@@ -97,6 +103,8 @@ def write_bug_report(
         if mesh is not None and shapes is not None:
             arrays = {**mesh, "shape_names": np.array([number[name] for name in shapes])}
             arrays |= {f"V{k}": shape for k, shape in enumerate(shapes.values())}
+            rows = [(*plane.normal, *plane.direction, plane.offset, plane.reach) for plane in planes]
+            arrays["planes"] = np.array(rows, dtype=np.float64).reshape(-1, _NUMBERS_OF_PLANE)
             buffer = io.BytesIO()
             write_arrays(buffer, arrays)
             archive.writestr(_SHAPES, buffer.getvalue(), zipfile.ZIP_STORED)
@@ -142,13 +150,30 @@ def read_bug_report(path: Path) -> BugReport:
         raise InputError(f"{path} goes through {len(through)} keys; 2 to {_MOST_KEYS} are possible.")
     archive_of_shapes = Archive(io.BytesIO(stored), path, NEEDED)
     names = tuple(dict.fromkeys(through))
+    # Earlier reports have no planes: they are found as for other files of shapes.
+    planes = _planes(archive_of_shapes, path) if "planes" in archive_of_shapes else None
+    pairs_of_halves = (len(through) - 1) << len(planes or ())  # each plane doubles the vertices
     shapes, faces, polygons = shapes_in(
-        archive_of_shapes, path, names, pairs=len(through) - 1, quality=fit_options.quality,
+        archive_of_shapes, path, names, pairs=pairs_of_halves, quality=fit_options.quality,
         needs_fits=needs_fits(frame_options.mode),
     )  # fmt: skip
     edges = archive_of_shapes.read(["edges"])["edges"] if "edges" in archive_of_shapes else None
-    task = Task.of_keys(shapes, faces, edges, through, fit_options, frame_options, polygons=polygons)
+    mirror: Mirror | tuple[MirrorPlane, ...] = "auto" if planes is None else planes
+    task = Task.of_keys(shapes, faces, edges, through, fit_options, frame_options, polygons=polygons, mirror=mirror)
     return BugReport(text, version, Task(task.pairs, through, fit_options, frame_options, play=play_options))
+
+
+def _planes(archive: Archive, path: Path) -> tuple[MirrorPlane, ...]:
+    """The mirror planes in a file of shapes; raises InputError if they are not what is written."""
+    rows = archive.read(["planes"])["planes"]
+    is_table = rows.dtype == np.float64 and rows.ndim == 2 and rows.shape[1] == _NUMBERS_OF_PLANE
+    if not is_table or len(rows) > _MOST_PLANES or not np.isfinite(rows).all():
+        raise InputError(f"The mirror planes in {path} make no sense; write the report again in Blender.")
+    if not np.allclose((rows[:, 0:3] * rows[:, 3:6]).sum(axis=1), 1.0):
+        raise InputError(f"A mirror plane in {path} mirrors nothing; write the report again in Blender.")
+    return tuple(
+        MirrorPlane((a, b, c), (x, y, z), offset, reach) for a, b, c, x, y, z, offset, reach in rows.tolist()
+    )
 
 
 def _entry(archive: zipfile.ZipFile, name: str, most: int) -> bytes:

@@ -74,12 +74,30 @@ def test_partly_on_adds_nothing_to_what_each_key_shows() -> None:
     def note(step: Progress) -> None:
         seen.append(step.overall)
 
-    found = qc3d.combine(REST, [raised, bent], FACES, weights=(0.5, 0.5), progress=note)
+    found = qc3d.combine(REST, [raised, bent], FACES, weights=(0.5, 0.5), between="natural", progress=note)
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
     own = [qc3d.fit(REST, key, FACES).inbetweens([0.5]).frames[0] for key in (raised, bent)]
     missed = max(off(*pair) for pair in zip(own, halves, strict=True))
     assert off(found.shape, posed(REST, 30.0, 30.0, SIDE)) < 2.0 * missed
+
+
+@pytest.mark.parametrize("weights", [(0.5, 0.5), (0.25, 1.0), (1.0, 0.6)])
+def test_joints_that_are_partly_turned_are_those_of_the_posed_arm(weights: tuple[float, float]) -> None:
+    keys = [posed(REST, 80.0, 0.0), posed(REST, 0.0, 90.0, SIDE)]
+    found = qc3d.combine(REST, keys, FACES, weights=weights)
+    assert off(found.shape, posed(REST, weights[0] * 80.0, weights[1] * 90.0, SIDE)) < 1e-6
+    assert [note for note in found.notes if "pose of one joint" in note]
+    assert found.crossings == 0
+
+
+@pytest.mark.slow
+def test_a_sculpted_key_beside_a_joint_shows_its_in_between() -> None:
+    swollen = REST + np.exp(-((REST[:, :1] - 2.0) ** 2) / 0.1) * REST * [0.0, 0.5, 0.5]
+    found = qc3d.combine(REST, [posed(REST, 80.0, 0.0), swollen], FACES, weights=(0.0, 0.5))
+    natural = qc3d.fit(REST, swollen, FACES).inbetweens([0.5]).frames[0]
+    np.testing.assert_array_equal(found.shape, natural)
+    assert not [note for note in found.notes if "pose of one joint" in note]
 
 
 def test_one_that_is_off_changes_nothing() -> None:
@@ -139,6 +157,7 @@ def test_loose_edges_and_vertices_go_along() -> None:
         ({"weights": (0.5, float("nan"))}, "nan"),
         ({"order": (0, 0)}, "order"),
         ({"quality": "coarse"}, "quality"),
+        ({"between": "posed"}, "posed"),
     ],
 )
 def test_what_cannot_be_is_refused(choices: dict[str, object], said: str) -> None:
@@ -158,10 +177,15 @@ def test_the_arm_of_the_cases(second: str, data_folder: Path) -> None:
         pytest.skip(f"{path} does not exist")
     with np.load(path, allow_pickle=False) as stored:
         shapes = {name: stored[f"V{number}"] for number, name in enumerate(stored["shape_names"].tolist())}
-        found = qc3d.combine(shapes["rest"], [shapes["raise80"], shapes[second]], stored["faces"])
+        faces = stored["faces"]
+    found = qc3d.combine(shapes["rest"], [shapes["raise80"], shapes[second]], faces)
     diagonal = np.linalg.norm(np.ptp(shapes["rest"], axis=0))
     assert np.linalg.norm(found.shape - shapes[f"raise80+{second}"], axis=1).max() < 1e-9 * diagonal
     assert found.crossings == 0
+    if second == "elbow90side":
+        half = qc3d.combine(shapes["rest"], [shapes["raise80"], shapes[second]], faces, weights=(0.5, 0.5)).shape
+        truth = shapes["half raise80+half elbow90side"]
+        assert np.linalg.norm(half - truth, axis=1).max() < 1e-9 * diagonal
 
 
 @pytest.mark.slow

@@ -22,8 +22,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 OURS: tuple[Mode, ...] = ("linear", "natural")
-PEERS = ("rotational", "smooth", "surface", "poisson", "arap")
-METHODS = ("straight", *PEERS, *OURS)
+MODULES = {
+    "rotational": rotational,
+    "smooth": corrective_smooth,
+    "surface": arap_surface,
+    "poisson": poisson,
+    "arap": arap,
+}
+METHODS = ("straight", *MODULES, *OURS)
 
 
 class Outcome(NamedTuple):

@@ -140,7 +140,7 @@ ENTRIES = (
     ),
     Entry(
         "inbetweens",
-        (("{python}", "benchmarks/inbetweens.py", "--write"),),
+        (_module("inbetweens", "--listed", "--write"),),
         "an hour",
         {f"{IMAGES}/inbetweens_{family}.png": "" for family in _FAMILIES},
         _written("inbetweens.md", "inbetweens"),
@@ -148,7 +148,13 @@ ENTRIES = (
     ),
     Entry("clips", (_module("clips"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
     Entry("played", (_module("played"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
-    Entry("continuous", (_module("continuous"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
+    Entry(
+        "continuous",
+        (_module("continuous"), _module("continuous", "--methods")),
+        "minutes",
+        printed=(f"{SCIENCE}/inbetweens.md",),
+        needs="shapes",
+    ),
     Entry("stages", (_module("stages", "--write"),), "minutes", tables=_written("speed.md", "stages"), needs="shapes"),
     Entry(
         "growth",

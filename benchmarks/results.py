@@ -5,15 +5,20 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from . import classical
 from .catalogue import ROOT, Floats, Ints, Pair
-from .methods import METHODS, OURS
+from .methods import METHODS, MODULES, OURS
+
+RESULTS = ROOT / "build/benchmarks"
 
 
 def revision() -> str:
@@ -35,12 +40,24 @@ def content(pair: Pair) -> str:
 
 def fingerprint(method: str) -> str:
     """Hash of the sources that a result of the method depends on."""
-    folder = "qc3d_addon/solver" if method in OURS else "benchmarks/classical"
-    sources = sorted((ROOT / folder).rglob("*.py")) + [ROOT / "benchmarks/measures.py"]
     digest = hashlib.sha256()
-    for source in sources:
+    for source in [*_sources(method), ROOT / "benchmarks/measures.py"]:
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def _sources(method: str) -> list[Path]:
+    """The solver, or the module of a classical method and those of the same folder that it imports."""
+    if method in OURS:
+        return sorted((ROOT / "qc3d_addon/solver").rglob("*.py"))
+    found, waiting = set[Path](), [MODULES[method]] if method in MODULES else []
+    while waiting:
+        module = Path(str(waiting.pop().__file__))
+        if module not in found:
+            found.add(module)
+            names = re.findall(r"^from \.(\w*) import (\w+)", module.read_text(encoding="utf-8"), re.MULTILINE)
+            waiting += [importlib.import_module(f"{classical.__name__}.{one or other}") for one, other in names]
+    return sorted(found)
 
 
 class Results:

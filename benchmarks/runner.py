@@ -16,7 +16,7 @@ from .catalogue import ROOT, Catalogue, Pair
 from .exact import exact_shape
 from .measures import Judge
 from .methods import METHODS, Contest
-from .results import Results
+from .results import RESULTS, Results
 from .verdict import RIVALRY, Verdict
 
 DOCUMENT = ROOT / "docs/science/inbetweens.md"
@@ -87,7 +87,7 @@ def arguments(argv: list[str] | None, description: str) -> argparse.Namespace:
     parser.add_argument("--quality", default="normal", help="how fine, for linear and natural")
     parser.add_argument("--frames", type=int, default=3, help="in-betweens, evenly spaced (default: 3)")
     parser.add_argument("--jobs", type=int, choices=(1, 2), default=1, help="processes")
-    parser.add_argument("--work", type=Path, default=ROOT / "build/benchmarks", help="folder of the results")
+    parser.add_argument("--work", type=Path, default=RESULTS, help="folder of the results")
     parser.add_argument("--stored", action="store_true", help="measure nothing, use what is there, old or new")
     parser.add_argument("--write", action="store_true", help=f"write tables and sheets of {DOCUMENT.name}")
     parser.add_argument("--check", action="store_true", help="exit status 1 where natural falls short")

@@ -6,8 +6,9 @@ Libigl deforms one shape by handles (``igl.arap_precomputation``, ``igl.arap_sol
 and rims). A morph of two keys is made of it as an animator would:
 
 1. Align the second key to the first by the best rigid motion.
-2. Handles are 3 % of the vertices, spread over the first key by farthest points; they move along straight lines. The
-   rest of the first key follows them as rigidly as possible, and so does the rest of the second key.
+2. Handles are 3 % of the vertices, spread over the first key by farthest points, and at least three of each connected
+   part; they move along straight lines. The rest of the first key follows them as rigidly as possible, and so does the
+   rest of the second key.
 3. The two shapes are blended with the weights 1 - t and t, so that both keys are met.
 4. Put back the fraction t of the rigid motion.
 """
@@ -19,17 +20,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from .gradients import Floats, Ints, RigidMotion
 
-HANDLES = 0.03
+HANDLES, FEWEST = 0.03, 3
 
 
 def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> Floats:
     """In-betweens (k, n, 3) at the times; needs the package ``libigl``."""
     motion = RigidMotion.between(key0, key1)
     target = motion.undo(key1)
-    handles = spread(key0, max(4, round(HANDLES * len(key0))))
+    handles = handles_of(key0, faces)
     deformed = [_Deformer(key, faces, handles) for key in (key0, target)]
     made = []
     for time in np.asarray(times, dtype=np.float64).tolist():
@@ -37,6 +40,17 @@ def frames(key0: Floats, key1: Floats, faces: Ints, times: ArrayLike) -> Floats:
         first, second = (one.shape(straight) for one in deformed)
         made.append(motion.apply((1.0 - time) * first + time * second, time))
     return np.stack(made)
+
+
+def handles_of(points: Floats, faces: Ints) -> Ints:
+    """Numbers of vertices: spread over all, and more in parts that have too few, where libigl finds no shape."""
+    sides = (np.ones(2 * len(faces)), (faces[:, :2].T.ravel(), faces[:, 1:].T.ravel()))
+    count, part = connected_components(coo_array(sides, shape=(len(points), len(points))), directed=False)
+    handles = spread(points, max(FEWEST + 1, round(HANDLES * len(points))))
+    few = np.flatnonzero(np.bincount(part[handles], minlength=count) < FEWEST)
+    members = [np.flatnonzero(part == number) for number in few]
+    more = [rows[spread(points[rows], min(FEWEST, len(rows)))] for rows in members]
+    return np.asarray(np.unique(np.concatenate([handles, *more])), dtype=np.int64)
 
 
 def spread(points: Floats, count: int) -> Ints:

@@ -65,6 +65,18 @@ def test_parts_without_connection_and_loose_vertices_follow(bar: dict[str, np.nd
     assert np.abs(frames[-1] - moved).max() < 1e-10
 
 
+def test_every_part_of_a_surface_has_handles(bar: dict[str, np.ndarray]) -> None:
+    rest, faces = bar["V0"], bar["faces"]
+    points = np.concatenate([rest, 0.01 * rest + 10.0])
+    both = np.concatenate([faces, faces + len(rest)])
+    handles = arap_surface.handles_of(points, both)
+    assert np.unique(handles).size == handles.size
+    assert np.count_nonzero(handles >= len(rest)) == arap_surface.FEWEST
+    np.testing.assert_array_equal(
+        arap_surface.handles_of(rest, faces), np.sort(arap_surface.spread(rest, round(0.03 * len(rest))))
+    )
+
+
 def test_the_rotation_nearest_to_a_reflection_is_proper() -> None:
     found = rotations_nearest(np.diag([2.0, 1.0, -0.1])[None])[0]
     assert np.allclose(found, np.eye(3))

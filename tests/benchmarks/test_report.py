@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from benchmarks import report, runner
+from benchmarks import results as results_module
 from benchmarks.catalogue import DATA, PAIRS, Catalogue, Pair
-from benchmarks.methods import Contest
+from benchmarks.methods import METHODS, Contest
 from benchmarks.results import Results
 from benchmarks.verdict import Verdict
 
@@ -118,6 +119,17 @@ def test_results_of_other_sources_are_not_reused(tmp_path: Path) -> None:
         path.write_text(json.dumps(found | {"fingerprint": "other"}), encoding="utf-8")
     assert results.load(LISTED, "natural") is None
     assert results.load(LISTED, "natural", current=False) is not None
+
+
+def test_results_depend_on_the_modules_of_their_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = {method: [path.stem for path in results_module._sources(method)] for method in METHODS}
+    assert own["arap"] == ["arap", "gradients", "interior"]
+    assert own["straight"] == []
+    assert {"natural", "course"} <= set(own["natural"])
+    before = {method: results_module.fingerprint(method) for method in METHODS}
+    monkeypatch.setitem(results_module.MODULES, "poisson", results_module.MODULES["smooth"])
+    changed = [method for method in METHODS if results_module.fingerprint(method) != before[method]]
+    assert changed == ["poisson"]
 
 
 def test_every_method_runs_on_a_small_pair(bar: dict[str, np.ndarray]) -> None:

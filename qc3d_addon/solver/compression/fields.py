@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
-from .graph_modes import MOST_IN_VOLUME, MOST_MODES, MOST_ON_SURFACE, graph_modes, laplacian
+from .graph_modes import MOST_MODES, MOST_VERTICES, graph_modes, laplacian
 from .hierarchy import Hierarchy
 
 Kind = Literal["plain", "levels", "modes"]
@@ -59,8 +59,7 @@ class Space:
     def most_modes(self) -> int:
         """How many modes there may be: none where they would take minutes."""
         count = len(self.points)
-        most = MOST_ON_SURFACE if self.is_surface else MOST_IN_VOLUME
-        return 0 if count > most else min(MOST_MODES, count // 4)
+        return 0 if count > MOST_VERTICES else min(MOST_MODES, count // 4)
 
     @property
     def is_surface(self) -> bool:
@@ -74,7 +73,7 @@ class Space:
             pairs = np.concatenate([self._cells[:, [a, b]] for a in range(corners) for b in range(a)])
             matrix = laplacian(np.unique(np.sort(pairs, axis=1), axis=0), len(self.points))
             distinct, which = np.unique(self.free, axis=1, return_inverse=True)
-            found = [graph_modes(matrix, column, count) for column in distinct.T]
+            found = [graph_modes(matrix, column, count, is_surface=self.is_surface) for column in distinct.T]
             # As many for each coordinate.
             columns = np.zeros((3, len(self.points), count))
             for coordinate, number in enumerate(which.ravel()):

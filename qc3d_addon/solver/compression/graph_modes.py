@@ -11,14 +11,16 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 
 from ..arrays import Bools, Floats, Ints
+from ..numerics.multigrid import Multigrid
+from ..support.memory import FACTORED_IN_VOLUME
 
 MOST_MODES = 120  # with more, no map or animation that was tried became smaller
-# With more, factoring takes minutes in a volume; on a surface of 110,000 vertices 30 modes take six seconds.
-MOST_IN_VOLUME, MOST_ON_SURFACE = 30_000, 120_000
+# On a surface of 110,000 vertices 30 modes take six seconds of factoring; in a volume, factoring would take minutes.
+MOST_VERTICES = 120_000
 _DENSE = 600
 # Weights that differ from edge to edge and from vertex to vertex, by a little: no symmetry and no second part of the
 # mesh leaves two eigenvalues equal, so every machine finds the same modes.
@@ -37,8 +39,11 @@ def laplacian(edges: Ints, count: int) -> csc_array:
     return csc_array(diags_array(adjacency.sum(axis=0) + ground) - adjacency)
 
 
-def graph_modes(matrix: csc_array, free: Bools, count: int) -> Floats:
-    """(n, k) the lowest modes of the free vertices (n,), orthonormal, 0 at all others; k is at most ``count``."""
+def graph_modes(matrix: csc_array, free: Bools, count: int, *, is_surface: bool) -> Floats:
+    """(n, k) the lowest modes of the free vertices (n,), orthonormal, 0 at all others; k is at most ``count``.
+
+    Those of large volumes are only nearly the lowest.
+    """
     rows = np.flatnonzero(free)
     inner = csc_array(matrix[rows][:, rows])
     count = min(count, len(rows))
@@ -47,9 +52,25 @@ def graph_modes(matrix: csc_array, free: Bools, count: int) -> Floats:
         vectors = np.zeros((len(rows), 0))
     elif len(rows) <= max(_DENSE, 3 * count):
         vectors = eigh(inner.toarray(), subset_by_index=(0, count - 1))[1]
+    elif is_surface or len(free) <= FACTORED_IN_VOLUME:
+        vectors = _lowest(inner, count, start)
     else:
-        values, vectors = eigsh(inner, k=count, sigma=_SHIFT, v0=start)
-        vectors = vectors[:, np.argsort(values, kind="stable")]
+        vectors = _interpolated(inner, count)
     modes = np.zeros((len(free), count))
     modes[rows] = vectors * np.where(start @ vectors < 0.0, -1.0, 1.0)
     return modes
+
+
+def _interpolated(matrix: csc_array, count: int) -> Floats:
+    """(n, k) the lowest modes among the functions that multigrid interpolates from a thirtieth of the vertices."""
+    random = np.random.default_rng(_SEED)
+    interpolation = Multigrid(csr_array(matrix), np.ones(matrix.shape[0]), random).interpolation
+    assert interpolation is not None
+    coarse, mass = (csc_array(interpolation.T @ (one @ interpolation)) for one in (matrix, eye_array(matrix.shape[0])))
+    return np.asarray(interpolation @ _lowest(coarse, count, random.normal(size=coarse.shape[0]), mass))
+
+
+def _lowest(matrix: csc_array, count: int, start: Floats, mass: csc_array | None = None) -> Floats:
+    """By Lanczos' method on the inverse of the shifted matrix."""
+    values, vectors = eigsh(matrix, k=count, M=mass, sigma=_SHIFT, v0=start)
+    return np.asarray(vectors[:, np.argsort(values, kind="stable")])

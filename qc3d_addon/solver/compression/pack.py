@@ -20,7 +20,7 @@ from ..tets.mesh import TetMesh
 from .compact import Boundary, Packed, from_bytes, space_of, to_bytes
 from .fields import Space
 from .files import Source, plain_bytes
-from .smallest import Wanted, largest_step, smallest
+from .smallest import Wanted, exact_size, largest_step, plain_size, smallest
 
 ChosenBoundary = Literal["auto", "sliding", "fixed", "exact"]
 
@@ -101,10 +101,16 @@ def small_maps(mesh: TetMesh, targets: Floats, error: float, boundary: ChosenBou
         field = yield from told(
             smallest(Wanted(space, moved, unit, asked)), partial(_between, start, 0.5 * (1.0 + start))
         )
+        if number and exact_size(space, field) > plain_size(Wanted(space, moved, unit, error)):
+            break  # nothing is paid for being without folds that makes a file larger than simple ones
         packed = Packed("maps", chosen, len(targets), field, exact)
-        found.append(_small_of(source, space, packed, mesh, targets))
+        data = to_bytes(source, space, packed)
+        restored = unpacked(data, source)
+        found.append(_small_of(data, packed, mesh, restored, targets))
         if any(found[-1].folds) and tries > 1:
-            found.append(_small_of(source, space, replace(packed, is_unfolded=True), mesh, targets))
+            packed = replace(packed, is_unfolded=True)
+            restored = _unfolded(source, space, restored)
+            found.append(_small_of(to_bytes(source, space, packed), packed, mesh, restored, targets))
         if any(found[-1].folds):
             break  # it cannot be unfolded
         if not found[-1].is_unfolded or found[-1].error <= error:
@@ -120,9 +126,7 @@ def _between(start: float, end: float, share: float) -> float:
     return start + share * (end - start)
 
 
-def _small_of(source: Source, space: Space, packed: Packed, mesh: TetMesh, targets: Floats) -> Small:
-    data = to_bytes(source, space, packed)
-    restored = unpacked(data, source)
+def _small_of(data: bytes, packed: Packed, mesh: TetMesh, restored: Floats, targets: Floats) -> Small:
     folds = tuple(Mapping(mesh, values).folds for values in restored)
     errors = errors_of(restored, targets, diagonal_of(mesh.points))
     return Small(data, packed.field.part.kind, restored, errors, folds, packed.is_unfolded)
@@ -154,9 +158,11 @@ def unpacked(data: bytes, source: Source) -> Floats:
     restored = source.points + packed.field.displacements(space)
     if packed.exact is not None:
         restored[:, source.boundary] = packed.exact
-    if packed.is_unfolded:
-        restored = np.stack([unfolded(source.mesh, values, space.free) for values in restored])
-    return np.asarray(restored)
+    return _unfolded(source, space, restored) if packed.is_unfolded else np.asarray(restored)
+
+
+def _unfolded(source: Source, space: Space, restored: Floats) -> Floats:
+    return np.stack([unfolded(source.mesh, values, space.free) for values in restored])
 
 
 def of_size(pack: OfError, size: int) -> Work:

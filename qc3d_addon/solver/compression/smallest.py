@@ -22,8 +22,9 @@ _MOST_BITS = 24
 # Smaller differences than this many steps are told as 0; which pays best depends on the field.
 _THRESHOLDS = (0.6, 0.5, 0.66)
 _COUNTS_OF_MODES = (30, 60, MOST_MODES)
-# With so many times the error after some modes, twice as many are not worth their time.
-_HOPELESS = 4.0
+# Each time there are twice as many modes, they leave no less of the error than this power of what they left last time.
+_HOPEFUL = 2.0
+_ROOMY = 0.9  # of the error is left by modes: where it is less, twice as many take more bytes than larger steps save
 _TRIALS = 14
 _NEAR = 0.995  # of the error is near enough
 # Sizes are first found approximately; those that are as good as so many times the best are then found exactly.
@@ -174,15 +175,17 @@ def _levels(wanted: Wanted, rows: Rows) -> Iterator[Candidate]:
 
 def _with_modes(wanted: Wanted, rows: Rows) -> Iterator[Candidate]:
     """The mesh's own modes, as few as come near enough, or twice as many; no more than are worth their time."""
-    space, smallest_size = wanted.space, np.inf
-    for count in dict.fromkeys(min(count, space.most_modes) for count in _COUNTS_OF_MODES):
+    space, is_enough = wanted.space, False
+    counts = list(dict.fromkeys(min(count, space.most_modes) for count in _COUNTS_OF_MODES))
+    for number, count in enumerate(counts, start=1):
         coefficients = analyzed(space, rows.rows, count)
-        excess = wanted.excess(rows.displacements(synthesized(space, coefficients)))
-        if not count or excess > _HOPELESS:
+        halves = (coefficients, coefficients[:, : count // 2])
+        excess, before = (wanted.excess(rows.displacements(synthesized(space, some))) for some in halves)
+        hope = (excess / max(before, 1e-300)) ** (_HOPEFUL * (len(counts) - number))
+        if not count or excess * hope >= _MARGIN:
             return
         if excess >= _MARGIN:
-            continue
-        before = smallest_size
+            continue  # there is hope
         for threshold in _THRESHOLDS:
 
             def part(step: float, coefficients: Floats = coefficients, threshold: float = threshold) -> Part:
@@ -191,11 +194,15 @@ def _with_modes(wanted: Wanted, rows: Rows) -> Iterator[Candidate]:
             step = _largest_step(wanted, rows, lambda step: part(step).field(space))
             if step is not None:
                 field = rows.field(part(step))
-                size = _approximate(space, field)
-                smallest_size = min(size, smallest_size)
-                yield size, field
-        if smallest_size >= before or before < np.inf:
+                yield _approximate(space, field), field
+        if excess < _ROOMY or is_enough:
             return
+        is_enough = True
+
+
+def plain_size(wanted: Wanted) -> int:
+    """About the bytes of the displacements by the simple ways alone."""
+    return min((size for size, _ in _plain(wanted, Rows(wanted.displacements))), default=0)
 
 
 def largest_step(wanted: Wanted) -> float | None:

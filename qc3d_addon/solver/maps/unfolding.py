@@ -16,11 +16,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..arrays import Bools, Floats, Ints
-from ..numerics.grouped_sums import sums_by_label
 from ..numerics.rotations import cofactors, determinants
 from ..tets.mesh import TetMesh
 
-_RINGS = 2  # of tetrahedra around the folded ones
+_RINGS = (2, 3)  # of tetrahedra around the folded ones: the wider where the narrower leave folds
 _SPRINGS = (100.0, 10.0, 1.0)  # strengths, the strongest first: those that unfold leave the map nearest
 _ROUNDS, _ITERATIONS = 8, 60
 _LEAST, _SLACK = 1e-3, 0.2  # e where there are no folds, and what it is over the deepest fold
@@ -42,10 +41,11 @@ def unfolded(mesh: TetMesh, values: Floats, free: Bools) -> Floats:
     size = float(np.cbrt(max(float(np.median(determinant)), 0.0)))
     if not (determinant <= 0.0).any() or not size > 0.0:
         return values
-    place = _Place.around(mesh, values / size, determinant <= 0.0, free)
-    if len(place.tets) <= _MOST_TETS:
-        for spring in _SPRINGS:
-            found = size * place.unfolded(spring)
+    for rings in _RINGS:
+        place = _Place.around(mesh, values / size, determinant <= 0.0, free, rings)
+        for spring in _SPRINGS if len(place.mesh.tets) <= _MOST_TETS else ():
+            found = size * (values / size)
+            found[place.vertices] = size * place.unfolded(spring)
             # Rounding may count where the place is scaled back.
             if (determinants(mesh.jacobians(found)) > 0.0).all():
                 return np.where(found == size * (values / size), values, found)
@@ -58,38 +58,40 @@ class _Place:
 
     Parameters
     ----------
-    values : (N, 3)
-    tets : (m, 4)
-    gradients : (m, 4, 3)
-        Of the hat functions of the tetrahedra.
+    vertices : (n,)
+        Those of these tetrahedra, among all.
+    mesh : TetMesh
+        These tetrahedra alone.
+    values : (n, 3)
     volumes : (m,)
         Over their mean.
     moving : (k,)
-        Numbers of the coordinates, among the 3 N, that may change.
+        Numbers of the coordinates, among the 3 n, that may change.
     edge : float
         A typical one.
     """
 
+    vertices: Ints
+    mesh: TetMesh
     values: Floats
-    tets: Ints
-    gradients: Floats
     volumes: Floats
     moving: Ints
     edge: float
 
     @classmethod
-    def around(cls, mesh: TetMesh, values: Floats, folded: Bools, free: Bools) -> _Place:
+    def around(cls, mesh: TetMesh, values: Floats, folded: Bools, free: Bools, rings: int) -> _Place:
         near = folded
-        for _ in range(_RINGS):
+        for _ in range(rings):
             near = _touching(mesh, near)[mesh.tets].any(axis=1)
         inside = ~_touching(mesh, ~near)
-        volumes = mesh.volumes[near]
-        moving = np.flatnonzero(inside[:, None] & free)
-        mean = float(volumes.mean())
-        return cls(values, mesh.tets[near], mesh.gradients[near], volumes / mean, moving, float(np.cbrt(mean)))
+        vertices, corners = np.unique(mesh.tets[near], return_inverse=True)
+        part = TetMesh(mesh.points[vertices], corners.reshape(-1, 4))
+        moving = np.flatnonzero((inside[:, None] & free)[vertices])
+        mean = float(part.volumes.mean())
+        return cls(vertices, part, values[vertices], part.volumes / mean, moving, float(np.cbrt(mean)))
 
     def unfolded(self, spring: float) -> Floats:
-        """(N, 3) the map that the energy and springs of a strength lead to."""
+        """(n, 3) where the energy and springs of a strength lead to."""
         start = self.values.ravel()[self.moving]
         places = start
         minimized: Any = minimize  # whose types leave this way of calling it out
@@ -126,14 +128,13 @@ class _Place:
         by_squares = soft ** (-2.0 / 3.0) / 3.0
         by_determinant = determinant / soft - (2.0 / 3.0 * shape + volume) / root
         stress = 2.0 * by_squares[:, None, None] * jacobians + by_determinant[:, None, None] * cofactors(jacobians)
-        forces = np.einsum("mcj,mkj->mkc", self.volumes[:, None, None] * stress, self.gradients)
-        total = sums_by_label(self.tets.ravel(), forces.reshape(-1, 3), len(self.values))
+        total = self.mesh.divergence(self.volumes[:, None, None] * stress)
         moved = (places - start) / self.edge
         energy = float(self.volumes @ (shape + volume)) + 0.5 * spring * float(moved @ moved)
         return energy, total.ravel()[self.moving] + spring * moved / self.edge
 
     def _jacobians(self, places: Floats) -> Floats:
-        return np.asarray(np.einsum("mkc,mkj->mcj", self._whole(places)[self.tets], self.gradients))
+        return self.mesh.jacobians(self._whole(places))
 
     def _whole(self, places: Floats) -> Floats:
         whole = self.values.copy()

@@ -9,17 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qc3d_addon.solver.compression import graph_modes as graph_modes_module
 from qc3d_addon.solver.compression.fields import GROWTHS, Part, Space, analyzed, synthesized
-from qc3d_addon.solver.compression.graph_modes import (
-    MOST_IN_VOLUME,
-    MOST_MODES,
-    MOST_ON_SURFACE,
-    graph_modes,
-    laplacian,
-)
+from qc3d_addon.solver.compression.graph_modes import MOST_MODES, MOST_VERTICES, graph_modes, laplacian
 from qc3d_addon.solver.compression.hierarchy import Hierarchy
 
-from ..meshes import icosphere, jittered_grid
+from ..meshes import icosphere, jittered_grid, sine_map
 
 MESH = jittered_grid(6, seed=0)
 
@@ -68,18 +63,32 @@ class TestModes:
             np.testing.assert_allclose(modes.T @ modes, np.eye(20), atol=1e-9)
             assert not modes[MESH.on_cube_face[:, coordinate]].any()
 
-    def test_large_surfaces_have_them_and_large_volumes_do_not(self) -> None:
-        points = np.zeros((MOST_IN_VOLUME + 1, 3))
-        surface, volume = (Space(points, np.arange(corners)[None]) for corners in (3, 4))
-        assert (surface.most_modes, volume.most_modes) == (MOST_MODES, 0)
-        assert Space(points[:-1], np.arange(4)[None]).most_modes == MOST_MODES
-        assert Space(np.zeros((MOST_ON_SURFACE + 1, 3)), np.arange(3)[None]).most_modes == 0
+    @pytest.mark.parametrize("corners", [3, 4])
+    def test_very_large_meshes_have_none(self, corners: int) -> None:
+        points, cells = np.zeros((MOST_VERTICES + 1, 3)), np.arange(corners)[None]
+        assert [Space(some, cells).most_modes for some in (points[:-1], points)] == [MOST_MODES, 0]
+
+    def test_those_of_large_volumes_are_nearly_the_lowest(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        mesh = jittered_grid(11, seed=1)
+        field = sine_map(mesh.points, np.full((1, 3), 0.05), np.ones((1, 3, 3), dtype=np.int64)) - mesh.points
+        missed = []
+        for most in (10**6, 0):
+            monkeypatch.setattr(graph_modes_module, "FACTORED_IN_VOLUME", most)
+            space = Space(mesh.points, mesh.tets, ~mesh.on_cube_face)
+            for coordinate, modes in enumerate(space.modes(12)):
+                np.testing.assert_allclose(modes.T @ modes, np.eye(12), atol=1e-9)
+                assert not modes[mesh.on_cube_face[:, coordinate]].any()
+            again = Space(mesh.points, mesh.tets, ~mesh.on_cube_face)
+            np.testing.assert_array_equal(again.modes(12), space.modes(12))
+            rest = synthesized(space, analyzed(space, field[None], 12)) - field
+            missed.append(np.linalg.norm(rest) / np.linalg.norm(field))
+        assert missed[0] <= missed[1] < 1.2 * missed[0] < 0.5
 
     def test_two_equal_parts_have_modes_of_their_own(self) -> None:
         points, faces = icosphere(2)
         both = np.concatenate([faces, faces + len(points)])
         matrix = laplacian(both[:, :2], 2 * len(points))
-        modes = graph_modes(matrix, np.ones(2 * len(points), dtype=bool), 2)
+        modes = graph_modes(matrix, np.ones(2 * len(points), dtype=bool), 2, is_surface=True)
         means = np.abs(modes.reshape(2, len(points), 2).sum(axis=1))
         assert sorted(means.argmax(axis=0).tolist()) == [0, 1]
         assert means.min() < 1e-3 * means.max()

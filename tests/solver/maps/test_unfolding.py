@@ -59,8 +59,8 @@ def test_what_cannot_be_unfolded_stays() -> None:
 @pytest.mark.parametrize("softness", [1e-3, 0.3])
 def test_forces_are_the_slope_of_the_energy(softness: float) -> None:
     values = noisy(0.05, 0)
-    place = _Place.around(TetMesh(MESH.points, MESH.tets), values, determinants(MESH.jacobians(values)) <= 0.0, FREE)
-    places = values.ravel()[place.moving]
+    place = _Place.around(TetMesh(MESH.points, MESH.tets), values, determinants(MESH.jacobians(values)) <= 0.0, FREE, 2)
+    places = place.values.ravel()[place.moving]
     start = places + 0.01
     direction = np.random.default_rng(1).normal(size=places.shape)
     _, forces = place._energy(places, start, softness, 10.0)

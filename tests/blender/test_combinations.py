@@ -227,7 +227,7 @@ def test_what_cannot_be_changes_nothing(rig: bpy.types.Object, state: State) -> 
     before = state()
     for chosen, said in (
         (["Raise"], "two or three"),
-        (["Raise", "Raise"], "two or three"),
+        (["Raise", "Raise"], "'Raise' is named twice"),
         (["Raise", "Lower"], "no shape key 'Lower'"),
         (["Raise", "Basis"], "relative to"),
     ):

@@ -109,12 +109,13 @@ def likely_partners(points: Floats, edges: Ints, known: Ints, axis: int = 0) -> 
         return known
     images = points.copy()
     images[:, axis] *= -1.0
-    distances, partners = cKDTree(points).query(images)
+    distances, found = cKDTree(points).query(images)
+    nearest = np.reshape(found, count)
     lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     ends = np.bincount(edges.ravel(), minlength=count)
     mean = np.bincount(edges.ravel(), weights=np.repeat(lengths, 2), minlength=count) / np.maximum(ends, 1)
-    fits = (distances < _LIKELY * mean) & (known < 0) & (known[partners] < 0)
-    partners = np.where(known >= 0, known, np.where(fits, partners, -1))
+    fits = (distances < _LIKELY * mean) & (known < 0) & (known[nearest] < 0)
+    partners: Ints = np.where(known >= 0, known, np.where(fits, nearest, -1))
     paired = np.flatnonzero(partners >= 0)
     partners[paired[partners[partners[paired]] != paired]] = -1
     codes = np.sort(edges, axis=1) @ [count, 1]

@@ -45,7 +45,9 @@ def closest_tangents(vectors: Floats, lengths: Floats | float = 1.0) -> Floats:
     """
     first, second = vectors[:, 0], vectors[:, 1]
     (x, y, z), (u, v, w) = first, second
-    one, two, mixed = (np.einsum("c...,c...->...", *pair) for pair in ((first, first), (second, second), (first, second)))
+    one, two, mixed = (
+        np.einsum("c...,c...->...", *pair) for pair in ((first, first), (second, second), (first, second))
+    )
     trace = one + two
     # In place from here on: arrays that are made and given up for every product take a third of the time.
     root, part, less = np.empty_like(one), np.empty_like(one), np.empty_like(one)

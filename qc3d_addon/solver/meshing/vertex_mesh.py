@@ -86,7 +86,7 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
         far, nearest = (np.asarray(found) for found in tree.query(positions, k=min(4, len(places))))
         graded = (local[nearest] + _SLOPE * far).min(axis=1)
         coarsest = np.minimum(widest + normal.slope * far[:, 0], normal.largest)
-        return np.minimum(graded, coarsest, dtype=np.float64)
+        return np.asarray(np.minimum(graded, coarsest), dtype=np.float64)
 
     return size
 

@@ -147,6 +147,13 @@ ENTRIES = (
         needs="shapes",
     ),
     Entry("clips", (_module("clips"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
+    Entry(
+        "chain picture",
+        (_module("chain_picture", f"{IMAGES}/chain.png"),),
+        "seconds",
+        {f"{IMAGES}/chain.png": ""},
+        needs="shapes",
+    ),
     Entry("played", (_module("played"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
     Entry(
         "continuous",

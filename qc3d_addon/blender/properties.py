@@ -13,6 +13,7 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from ..solver.errors import InputError
 from ..solver.settings import FitOptions, FrameOptions
+from .bake import jobs
 from .bake.request import BakeRequest
 from .bake.suggested_keys import suggested_keys
 from .choices import BakeChoices, MapChoices
@@ -41,6 +42,7 @@ def _get_first(settings: "ObjectSettings") -> str:
 
 def _set_first(settings: "ObjectSettings", name: str) -> None:
     settings.from_key = name
+    jobs.prepare_ahead()
 
 
 def _get_last(settings: "ObjectSettings") -> str:
@@ -49,6 +51,7 @@ def _get_last(settings: "ObjectSettings") -> str:
 
 def _set_last(settings: "ObjectSettings", name: str) -> None:
     settings.to_key = name
+    jobs.prepare_ahead()
 
 
 def _get_row(settings: "ObjectSettings") -> int:

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 
 import qc3d_addon
 from qc3d_addon.blender.bake import jobs
+from qc3d_addon.blender.properties import settings_of
 
 ReadShapes = Callable[[bpy.types.Object], dict[str, np.ndarray]]
 
@@ -62,4 +64,17 @@ def test_a_bake_that_cannot_begin_leaves_it_waiting(figure: bpy.types.Object) ->
         bpy.ops.qc3d.bake_inbetweens(play_on="slider", from_key="Basis", to_key="Basis")
     child = jobs.standby()._child
     assert child is not None
+    assert bake("Lean").pid == child.process.pid
+
+
+def test_it_starts_while_keys_are_chosen_in_the_panel(
+    figure: bpy.types.Object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings_of(figure).last = "Stretch"  # by a script
+    assert jobs.standby()._child is None
+    monkeypatch.setattr(jobs, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    settings_of(figure).last = "Lean"
+    child = jobs.standby()._child
+    assert child is not None
+    assert child.process.poll() is None
     assert bake("Lean").pid == child.process.pid

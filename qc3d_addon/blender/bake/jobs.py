@@ -94,6 +94,12 @@ def prepare() -> None:
         standby().prepare()
 
 
+def prepare_ahead() -> None:
+    """The same while the user still chooses what to bake; scripts, which bake at once if at all, need no such help."""
+    if not bpy.app.background:
+        prepare()
+
+
 def current() -> Job | None:
     """The job that is running, or None."""
     return _current

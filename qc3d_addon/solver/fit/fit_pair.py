@@ -10,17 +10,18 @@ from functools import partial
 import numpy as np
 
 from ..arrays import Floats
+from ..collision.self_crossings import CrossingLimit
 from ..keys.checks import require_sizes
 from ..keys.embedding import Embedding
 from ..keys.keypair import KeyPair
 from ..keys.orientation import require_reachable
 from ..settings import FitOptions
 from ..support.progress import Progress, Steps, staged, timed
-from ..support.threads import beside
+from ..support.threads import ahead, beside
 from ..surface.path import SurfacePath
 from .continuation import follow_path, path_to
 from .directions import half_turned_parts, path_between
-from .fitted_map import FittedMap
+from .fitted_map import FittedMap, crossing_limit
 from .lattice import way_on_lattice
 from .meeting import MET, meet_keys
 from .own_crossings import crossing_vertices
@@ -104,12 +105,18 @@ def _near(
         yield Progress("locate", 1.0)
         yield Progress("fit", 0.0)
         path, targets = way.result()
-    with timed(seconds, "fit"):
+    with timed(seconds, "fit"), ahead(partial(_for_frames, embedding, path, volume)) as limit:
         followed = yield from staged("fit", follow_path(fitter, [in_single_precision(target) for target in targets]))
         followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)
-    return FittedMap(embedding.pair, volume, *parts)
+    return FittedMap(embedding.pair, volume, *parts, None if limit is None else limit.result())
+
+
+def _for_frames(embedding: Embedding, path: SurfacePath, volume: Volume) -> CrossingLimit:
+    """What the frames will need, made while the fit keeps one core busy only; returns what the volume does not keep."""
+    _ = volume.system, volume.around_landmarks
+    return crossing_limit(embedding, path, volume)
 
 
 def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float]) -> Steps[FittedMap]:

@@ -42,6 +42,11 @@ class Residual:
     max: float
 
 
+def crossing_limit(embedding: Embedding, path: SurfacePath, volume: Volume) -> CrossingLimit:
+    """How much shapes between the keys of an embedded pair may cross themselves; shapes are in cube units."""
+    return CrossingLimit(embedding.pair.welded_faces, embedding.key0, embedding.key1, path.still, volume.search)
+
+
 @dataclass(frozen=True, eq=False)
 class FittedMap:
     """The fitted map of a pair of keys. It is kept, so that later bakes of the same keys skip meshing and fitting.
@@ -66,6 +71,8 @@ class FittedMap:
         Wall-clock time of each stage, in seconds.
     path : SurfacePath, optional
         The surface path between the keys, if it is known already.
+    limit : CrossingLimit, optional
+        How much shapes between the keys may cross themselves, if that is known already.
     """
 
     pair: KeyPair
@@ -77,6 +84,7 @@ class FittedMap:
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     path: SurfacePath | None = field(default=None, repr=False)
+    limit: CrossingLimit | None = field(default=None, repr=False)
 
     @classmethod
     def restored(
@@ -123,8 +131,7 @@ class FittedMap:
     @cached_property
     def crossings(self) -> CrossingLimit:
         """How much shapes between the keys may cross themselves; shapes are in cube units."""
-        keys, still = (self.embedding.key0, self.embedding.key1), self.surface_path.still
-        return CrossingLimit(self.pair.welded_faces, *keys, still, self.volume.search)
+        return self.limit or crossing_limit(self.embedding, self.surface_path, self.volume)
 
     @cached_property
     def fitter(self) -> FoldFreeFitter:

@@ -17,8 +17,8 @@ _SYMMETRIC = 1e-5
 # Of the diagonal: if a frame differs more from its mirror image, the motion itself is not symmetric, like that of
 # something that turns over.
 _ONE_SIDED = 0.05
-# Vertices that are looked at first: most planes are none of symmetry, which these few tell.
-_FIRST_LOOK = 60
+# Vertices that are looked at first, and then: most planes are none of symmetry, which these few tell.
+_FIRST_GLANCE, _FIRST_LOOK = 4, 60
 # So many vertices are tried, each with so many partners.
 _TRIED = 24
 
@@ -48,22 +48,18 @@ class MirrorImages:
         keys = (pair.key0[self._vertices], pair.key1[self._vertices])
         both = np.concatenate(keys)
         point = both.mean(axis=0)
-        normals = _candidates([key - point for key in keys], _SYMMETRIC * self._size)
+        reach = _SYMMETRIC * self._size
         tree = cKDTree(np.concatenate(keys, axis=1))
-        some = np.unique(np.linspace(0, len(both) // 2 - 1, _FIRST_LOOK, dtype=np.int64))
         self._planes: list[_Plane] = []
-        for normal in normals:
+        for normal in _promising(_candidates([key - point for key in keys], reach), point, keys, tree, reach):
             if any(abs(normal @ plane.normal) > 1.0 - _SYMMETRIC for plane in self._planes):
                 continue
-            images = np.concatenate([_reflected(key[some], normal, point) for key in keys], axis=1)
-            if np.max(tree.query(images)[0]) > _SYMMETRIC * self._size:
-                continue
             images = np.concatenate([_reflected(key, normal, point) for key in keys], axis=1)
-            distances, found = tree.query(images)
-            partners: Ints = np.asarray(found, dtype=np.int64)
-            numbers = np.arange(len(partners))
-            if np.max(distances) <= _SYMMETRIC * self._size and (partners[partners] == numbers).all():
-                self._planes.append(_Plane(normal, point, partners))
+            distances, found = tree.query(images, distance_upper_bound=reach)
+            if np.isfinite(distances).all():
+                partners: Ints = np.asarray(found, dtype=np.int64)
+                if (partners[partners] == np.arange(len(partners))).all():
+                    self._planes.append(_Plane(normal, point, partners))
         self._own = self._asymmetries()
 
     def __bool__(self) -> bool:
@@ -108,6 +104,18 @@ def _candidates(keys: list[Floats], reach: float) -> Floats:
         apart = length > 1e2 * reach
         found.append((between[apart] / length[apart, None])[:_TRIED])
     return np.concatenate(found)
+
+
+def _promising(normals: Floats, point: Floats, keys: tuple[Floats, Floats], tree: cKDTree, reach: float) -> Floats:
+    """(c, 3) those of the normals (k, 3) whose planes mirror a few vertices of both keys, which ``tree`` has."""
+    some = np.unique(np.linspace(0, len(keys[0]) - 1, _FIRST_LOOK, dtype=np.int64))
+    for few in (some[:: max(1, len(some) // _FIRST_GLANCE)], some):
+        away = [(key[few] - point) @ normals.T for key in keys]
+        images = [key[few] - 2.0 * far.T[..., None] * normals[:, None] for key, far in zip(keys, away, strict=True)]
+        # Nearest neighbors of what has no partner would be far away, and finding them takes long.
+        distances, _ = tree.query(np.concatenate(images, axis=2), distance_upper_bound=reach)
+        normals = normals[np.isfinite(distances).all(axis=1)]
+    return normals
 
 
 def _reflected(points: Floats, normal: Floats, point: Floats) -> Floats:

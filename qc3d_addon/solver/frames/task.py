@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +25,7 @@ from ..keys.keypair import Ends, KeyPair, consecutive_pairs
 from ..settings import FitOptions, FrameOptions, Mirror, PlayOptions
 from ..support.memory import estimated_mb, require_memory
 from ..support.progress import Steps, numbered, timed
+from ..support.threads import beside
 from .bake import Bake, checked_times
 from .chain import chain_frames
 from .following import Following
@@ -178,7 +179,6 @@ def carry_out(
         following = Following(task.collider, times, task.fit_options, task.frame_options)
     every = task.new_fits + (following.fits if following is not None else 0)
     fits: dict[Ends, FittedMap] = {}
-    stored: dict[Ends, bytes] = {}
     made = 0
     names = list(dict.fromkeys(task.through))
     for ends, pair in task.pairs.items() if task.needs_fits else ():
@@ -186,14 +186,29 @@ def carry_out(
             data = task.kept.get(ends)
             if data is None:
                 fits[ends] = yield from numbered(fit_pair(pair, task.fit_options, shared(pair)), made, every)
-                data, made = to_bytes(fits[ends]), made + 1
-                if recent is not None:
-                    recent.keep(data, fits[ends])
+                made += 1
             else:
                 fits[ends] = from_bytes(data, pair) if recent is None else recent.restored(data, pair)
-            stored[ends] = data
-    if not len(times):
-        return Outcome(stored, None)
+    with beside(partial(_stored, fits, task.kept, recent)) as stored:
+        bake = (yield from _baked(task, times, fits, following, every)) if len(times) else None
+    return Outcome(stored.result(), bake)
+
+
+def _stored(
+    fits: Mapping[Ends, FittedMap], kept: Mapping[Ends, bytes], recent: RecentFits | None
+) -> dict[Ends, bytes]:
+    """The stored fits, those that are new stored and remembered now."""
+    stored = {ends: kept[ends] if ends in kept else to_bytes(fitted) for ends, fitted in fits.items()}
+    if recent is not None:
+        for ends in fits.keys() - kept.keys():
+            recent.keep(stored[ends], fits[ends])
+    return stored
+
+
+def _baked(
+    task: Task, times: Floats, fits: Mapping[Ends, FittedMap], following: Following | None, every: int
+) -> Steps[Bake]:
+    """The frames, by the fits of the pairs; ``every`` is the number of fits that came before."""
     collider = None
     if following is not None:
         collider = yield from numbered(following.posed(), task.new_fits, every)
@@ -206,4 +221,4 @@ def carry_out(
         with timed(bake.report.seconds, "played"):
             own = [pair.own for pair in pairs]
             bake = played(bake, task.moments, own, fitted, task.play, task.frame_options)
-    return Outcome(stored, bake)
+    return bake

@@ -160,18 +160,21 @@ def _errors(samples: Floats, motions: Floats, radii: Floats, area: float, count:
         used = int(np.clip(_ON_A_SHEET * area / (np.pi * radius**2), 4 * _NEIGHBORS, len(samples)))
         if used <= _AFFINE:
             continue
-        places, tree = samples[:used], cKDTree(samples[:used])
+        # Errors are asked for at the first of the samples: none of the others is nearer to one of these than itself.
+        places, tree = samples[: min(used, count)], cKDTree(samples[:used])
         far, near = _nearest(tree, places, _NEIGHBORS)
         within = (far <= radius).astype(np.float64)
-        offsets = (places[near] - places[:, None]) / radius
+        offsets = (samples[near] - places[:, None]) / radius
         terms = np.concatenate([np.ones_like(offsets[..., :1]), offsets], axis=2) * within[..., None]
-        ways = (motions[near] - motions[:used, None]) * within[..., None]
+        ways = (motions[near] - motions[: len(places), None]) * within[..., None]
         normal = terms.transpose(0, 2, 1) @ terms + _RIDGE * np.eye(_AFFINE)
         loads = terms.transpose(0, 2, 1) @ ways
         whole = (ways**2).sum(axis=(1, 2))
         left = np.maximum(whole - (loads * np.linalg.solve(normal, loads)).sum(axis=(1, 2)), 0.0) + _SPREAD**2 * whole
         errors = np.sqrt(left / np.maximum(within.sum(axis=1) - _AFFINE, 1.0))
-        found[:, level] = np.maximum(errors[_nearest(tree, samples[:count], 1)[1][:, 0]], _LEAST_ERROR)
+        if used < count:
+            errors = errors[_nearest(tree, samples[:count], 1)[1][:, 0]]
+        found[:, level] = np.maximum(errors, _LEAST_ERROR)
     return np.maximum.accumulate(found, axis=1)
 
 

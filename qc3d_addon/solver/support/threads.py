@@ -74,6 +74,16 @@ def beside(work: Callable[[], Result]) -> Iterator[Future[Result]]:
     pool.shutdown()
 
 
+@contextmanager
+def ahead(work: Callable[[], Result]) -> Iterator[Future[Result] | None]:
+    """Context manager like ``beside`` for work that can be done later; None where threads would not help."""
+    if thread_count() == 1:
+        yield None
+        return
+    with beside(work) as done:
+        yield done
+
+
 def batches(items: Sequence[Item], most: int) -> list[Sequence[Item]]:
     """Items in batches of at most ``most``, and small enough that every thread gets one."""
     size = max(1, min(most, -(-len(items) // thread_count())))

@@ -13,7 +13,7 @@ import copy
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..numerics.grouped_sums import means_by_label
 from ..numerics.rising import risen
 from ..triangles.geometry import edge_lengths
@@ -46,34 +46,38 @@ class LengthsFirst:
         since no motion of its own leads there.
     halfway : (n, 3)
         The middle of the straight lines between the keys before the motion of the whole was taken out, cube units.
+    free : (n,) bool
+        Vertices that may move even if both keys leave them in place.
     """
 
     def __init__(
-        self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats, halfway: Floats
+        self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats, halfway: Floats, free: Bools
     ) -> None:
         ends = [edge_lengths(key, edges) for key in (key0, key1)]
         usable = np.minimum(*ends) > _SHORTEST
+        counts = np.bincount(labels[edges[usable, 0]], minlength=int(labels.max(initial=-1)) + 1)
+        moving = (key0 != key1).any(axis=1)
+        # Edges that stay in place keep their lengths.
+        usable &= (moving | free)[edges].any(axis=1)
         self._edges = edges[usable]
         self._shortest, self._longest = np.minimum(*ends)[usable], np.maximum(*ends)[usable]
-        self._moving = (key0 != key1).any(axis=1)[self._edges].any(axis=1)
+        self._moving = moving[self._edges].any(axis=1)
         self._labels = labels
         self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
         self._reversal = reversal
         self._straight_share = np.ones(len(reversal))
-        counts = np.bincount(self._label, minlength=int(labels.max(initial=-1)) + 1)
-        # Position of each component's percentile among all edges, sorted by component and excess.
-        self._has_edges = np.flatnonzero(counts)
-        starts = np.cumsum(counts) - counts
+        self._is_one = np.count_nonzero(counts) == 1
+        # Of each component, how many edges lie beyond its percentile.
+        self._beyond = counts - 1 - np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64)
         self._counts = np.maximum(counts, 1)
-        self._places = (starts + np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64))[self._has_edges]
         # Of each component, how far the straight blend may be gone along: not at all where any edge suffers half-way.
         worst = np.zeros(len(counts))
         np.maximum.at(worst, self._label, self._excesses(0.5 * (key0 + key1)))
         self._can_go_straight = np.clip((_SUFFERS - worst) / (_SUFFERS - _MOST_EXCESS), 0.0, 1.0)
-        self._can_go_straight[np.bincount(labels, weights=(key0 != key1).any(axis=1)) == 0] = 0.0
+        self._can_go_straight[np.bincount(labels, weights=moving) == 0] = 0.0
         # Beside a key all lines keep lengths; those that lose them half-way are no way at all.
-        self._can_follow_lines = _tolerable(self._excess(halfway))
+        self._can_follow_lines = _tolerable(self._excess(self._excesses(halfway)))
 
     def mixed(self, held: Floats, free: Floats, time: float) -> Floats:
         """(n, 3) blend of shapes with (``held``) and without kept volumes, as close to the former as lengths allow.
@@ -81,7 +85,8 @@ class LengthsFirst:
         Lengths may be as bad as without kept volumes, or as in the straight blend at ``time``, and a little worse.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
-        added = self._excess(held) - np.maximum(self._excess(free), self._excess(straight))
+        held_excess, *others = (self._excess(self._excesses(one)) for one in (held, free, straight))
+        added = held_excess - np.maximum(*others)
         part = _allowed(added)
         return np.asarray(free + part[self._labels][:, None] * (held - free))
 
@@ -100,16 +105,18 @@ class LengthsFirst:
         something that is sheared keep its lengths, although they turn it.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
-        worse = self._mean_excess(shape) - self._mean_excess(straight)
+        excesses = self._excesses(shape)
+        worse = self._mean_excess(excesses) - self._mean_excess(self._excesses(straight))
         need = np.maximum((1.0 - _allowed(worse)) * self._straight_share, self._reversal)
         can_go_straight = self._can_go_straight * self._straight_share
-        if can_go_straight.any():
-            need = np.maximum(need, (1.0 - _allowed(self._excess(shape))) * can_go_straight)
+        excess = self._excess(excesses)
+        need = np.maximum(need, (1.0 - _allowed(excess)) * can_go_straight)
         if need.any():
             shape = shape + need[self._labels][:, None] * (straight - shape)
-        costs = (1.0 - _allowed(self._excess(shape))) * self._can_follow_lines * self._straight_share
+            excess = self._excess(self._excesses(shape))
+        costs = (1.0 - _allowed(excess)) * self._can_follow_lines * self._straight_share
         if costs.any():
-            costs *= _tolerable(self._excess(lines))
+            costs *= _tolerable(self._excess(self._excesses(lines)))
             shape = shape + costs[self._labels][:, None] * (lines - shape)
         return shape
 
@@ -118,20 +125,25 @@ class LengthsFirst:
         excess = self._excesses(shape)[self._moving]
         return float(np.percentile(excess, 100.0 * _PERCENTILE)) if len(excess) else 0.0
 
-    def _mean_excess(self, shape: Floats) -> Floats:
-        """(components,) mean over its edges of how far they leave the interval between their key lengths, relative."""
-        return np.asarray(
-            np.bincount(self._label, weights=self._excesses(shape), minlength=len(self._counts)) / self._counts
-        )
+    def _mean_excess(self, excesses: Floats) -> Floats:
+        """(components,) mean over its edges of the excesses (e,)."""
+        return np.asarray(np.bincount(self._label, weights=excesses, minlength=len(self._counts)) / self._counts)
 
-    def _excess(self, shape: Floats) -> Floats:
-        """(components,) 99th percentile of how far edges leave the interval between their key lengths, relative."""
-        excess = self._excesses(shape)
+    def _excess(self, excesses: Floats) -> Floats:
+        """(components,) 99th percentile of the excesses (e,) of its edges."""
+        # Most edges have none: only the others are sorted.
+        some = np.flatnonzero(excesses)
+        label, values = self._label[some], excesses[some]
+        ends = np.cumsum(np.bincount(label, minlength=len(self._counts)))
+        places = ends - 1 - self._beyond
+        reached = (self._beyond >= 0) & (places >= np.append(0, ends[:-1]))
         found = np.zeros(len(self._counts))
-        if len(self._has_edges) == 1:  # sorting all edges would take as long as a sweep
-            found[self._has_edges] = np.partition(excess, self._places)[self._places]
-        else:
-            found[self._has_edges] = excess[np.lexsort((excess, self._label))][self._places]
+        if reached.any():
+            places = places[reached]
+            if self._is_one:  # sorting all edges would take as long as a sweep
+                found[reached] = np.partition(values, places)[places]
+            else:
+                found[reached] = values[np.lexsort((values, label))][places]
         return found
 
     def _excesses(self, shape: Floats) -> Floats:

@@ -141,7 +141,7 @@ class SurfacePath:
         weights = sums_by_label(self.group, embedding.weights, count)
         edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
         reversal, halfway = self._closed.reversal(self._key0, key1), embedding.straight(0.5)[self.vertices]
-        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, reversal, halfway)
+        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, reversal, halfway, self._free)
         turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
         self._places = PartPlaces(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from qc3d_addon.solver.fit.fit_pair import fit_pair
+from qc3d_addon.solver.frames.mirror_image import MirrorImages
 from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.settings import FitOptions
@@ -38,3 +39,16 @@ def test_symmetric_keys_have_symmetric_frames(kind: str, seed: int) -> None:
     for frame in frames_of(finish(fit_pair(pair, FitOptions())), [0.25, 0.5]).frames:
         back = (frame - shift) @ rotation
         assert np.abs(back[partners] * [1.0, 1.0, -1.0] - back).max() < 1e-9 * pair.diagonal
+
+
+def test_planes_are_found_where_both_keys_have_them() -> None:
+    points, faces = box_surface((4, 6, 8), (1.0, 1.5, 2.0))
+    points = points - points.mean(axis=0)
+    bent = points + 0.2 * points[:, 2:] ** 2 * [1.0, 0.0, 0.0]
+    leaning = points + 0.2 * points[:, 1:2] * points[:, 2:] * [1.0, 0.0, 0.0]
+    twisted = leaning + 0.1 * np.sin(points @ [1.0, 2.0, 3.0])[:, None]
+    for key1, normals in ((points, 3), (bent, 2), (leaning, 0), (twisted, 0)):
+        found = MirrorImages(KeyPair.checked(points, key1, faces))
+        assert len(found._planes) == normals
+        for plane in found._planes:
+            np.testing.assert_allclose(plane.image(key1), key1, rtol=0.0, atol=1e-4)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 
 from qc3d_addon.solver.arrays import Floats
 from qc3d_addon.solver.errors import InputError
@@ -31,6 +32,13 @@ def test_what_every_set_of_weights_is(places: Floats) -> None:
         np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12 * scale)
         # A motion along a straight line is played as it is, beyond its ends too.
         np.testing.assert_allclose(found @ places, EVERYWHERE, atol=1e-12 * scale)
+
+
+@given(knots())
+def test_smooth_weights_are_the_spline_of_scipy(places: Floats) -> None:
+    wanted = CubicSpline(places, np.eye(len(places)))(places, 1)
+    for slopes in Weights.smooth(places).slopes:
+        np.testing.assert_allclose(slopes, wanted, rtol=0.0, atol=1e-11 * max(1.0, np.abs(wanted).max()))
 
 
 @pytest.mark.parametrize("count", [4, 5, 9])

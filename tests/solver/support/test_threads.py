@@ -10,7 +10,7 @@ from threading import Event
 
 import pytest
 
-from qc3d_addon.solver.support.threads import batches, beside, in_threads, thread_count
+from qc3d_addon.solver.support.threads import ahead, alone, batches, beside, in_threads, thread_count
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
@@ -67,3 +67,13 @@ def test_after_an_error_nobody_waits_for_what_goes_on_beside() -> None:
     with pytest.raises(KeyError), beside(never.wait):
         raise KeyError
     never.set()
+
+
+def test_what_can_wait_is_not_done_ahead_where_threads_would_not_help() -> None:
+    done: list[int] = []
+    with alone(), ahead(lambda: done.append(1)) as job:
+        assert job is None
+    assert not done
+    with ahead(lambda: 3) as job:
+        pass
+    assert job is None if thread_count() == 1 else job is not None and job.result() == 3

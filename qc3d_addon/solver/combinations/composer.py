@@ -16,13 +16,14 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..numerics.rotations import by_component, products, rotation_matrices
-from ..surface.path import ANCHOR_WEIGHT, SWEEPS, edges_without_triangle
+from ..surface.path import ANCHOR_WEIGHT, SWEEPS
 from ..surface.sweeps import Sweeps, Wanted
 from ..surface.system import MovingSurface
 from ..surface.tangents import tangents_of
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.deformation import TriangleDeformation
 from ..triangles.geometry import vertex_areas
+from ..triangles.topology import edges_without_triangle
 from .averages import Averages
 from .base import KeysOnBase
 from .volumes import volume_off_range

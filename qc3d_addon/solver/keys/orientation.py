@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats, Ints
 from ..errors import InputError
-from ..numerics.grouped_sums import sums_by_label
+from ..numerics.grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from ..triangles.closed_volume import AS_FULL, ClosedComponents
-from ..triangles.geometry import areas
+from ..triangles.geometry import areas, edge_lengths
 from ..triangles.topology import sides, unique_edges, vertex_components
+from .embedding import Embedding
 from .keypair import KeyPair
 
 # Share of the surface above which the key as a whole counts as mirrored, and not only some of its parts.
@@ -24,6 +25,10 @@ _LEAST_VOLUME, _LEAST_OF_A_PART = 1e-9, 1e-12
 # Volumes over areas to the power of 3/2; a sphere has 0.094. What is flatter than that in a key has no inside there:
 # rounding may decide about the sign.
 _FLAT = 1e-4
+# What passes through itself along straight lines, as a flat pyramid does through its base, is not turned inside out by
+# that if no edge gets shorter or longer on the way than in both keys by more than this part of its length.
+_PASSES = 0.1
+_MOMENTS = 0.25, 0.5, 0.75
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,8 @@ def mirrored_share(pair: KeyPair) -> float:
 def reversal(pair: KeyPair) -> Reversal:
     """Find what is mirrored, turned inside out or tangled, by the sign of each closed component's volume.
 
-    Open components are never counted: they have no inside, and a leaf may well bend into its mirror image.
+    Open components are never counted: they have no inside, and a leaf may well bend into its mirror image. Nor are
+    those that can go straight, because they are so flat that this costs hardly any lengths.
     """
     vertices, group = pair.welding
     keys = [_in_unit_size(key[vertices]) for key in (pair.key0, pair.key1)]
@@ -97,6 +103,8 @@ def reversal(pair: KeyPair) -> Reversal:
     surface = np.stack([sums_by_label(labels[faces[:, 0]], areas(key, faces)[:, None], count)[:, 0] for key in keys])
     full = np.abs([closed.fullness(key) for key in keys])
     flips &= full.min(axis=0) > _FLAT
+    if flips.any():
+        flips &= ~_passing(pair, faces, labels)
     is_real = full[1] > AS_FULL * full[0]
     is_reversed = flips & (least > _LEAST_VOLUME)
     is_part = flips & (least > _LEAST_OF_A_PART)
@@ -109,6 +117,28 @@ def reversal(pair: KeyPair) -> Reversal:
         most = " most of it" if len(parts) > 1 else ""
         where = f",{most} in the part of {len(members)} vertices to which vertex {members[0]} belongs"
     return Reversal(mirrored, tangled, int((is_part & is_real).sum()), where)
+
+
+def _passing(pair: KeyPair, faces: Ints, labels: Ints) -> Bools:
+    """(components,) which of them keep the lengths of their edges on straight lines.
+
+    These are the lines between the keys without the motion of the whole, and without growth along the longest axis:
+    what grows a lot while it is turned inside out stays between its lengths, too. ``faces`` (m, 3) and ``labels`` use
+    one vertex of each group that coincides in both keys.
+    """
+    embedding, vertices, edges = Embedding.of(pair), pair.welding[0], unique_edges(sides(faces))
+    key0, key1 = embedding.key0[vertices], embedding.key1[vertices]
+    spread = [key - means_by_label(labels, key)[labels] for key in (key0, key1)]
+    length = np.stack([np.linalg.eigvalsh(covariances_by_label(labels, each, each))[:, -1] for each in spread])
+    key1 = key1 * np.sqrt(length[0] / np.maximum(length[1], 1e-300))[labels][:, None]
+    ends = np.stack([edge_lengths(key, edges) for key in (key0, key1)])
+    short, long = ends.min(axis=0), ends.max(axis=0)
+    worst = np.zeros(int(labels.max()) + 1)
+    for time in _MOMENTS:
+        length = edge_lengths((1.0 - time) * key0 + time * key1, edges)
+        beyond = np.maximum(short - length, length - long) / np.maximum(long, 1e-300)
+        np.maximum.at(worst, labels[edges[:, 0]], beyond)
+    return np.asarray(worst <= _PASSES)
 
 
 def _in_unit_size(key: Floats) -> Floats:

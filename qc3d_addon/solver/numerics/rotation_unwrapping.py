@@ -9,19 +9,15 @@ rotations.
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from ..arrays import Bools, Floats, Ints
 from .grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from .rising import risen
+from .rotation_forest import RotationForest, relative_angles
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
 
 # Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
@@ -30,7 +26,6 @@ _MOST_SWING = 1.5 * np.pi, 1.6 * np.pi
 # Share of a part's weight that must turn further than that: a few badly shaped triangles must not decide for the part.
 # The twist sets in gradually from the first share to the second.
 _FAIR_SHARE = 0.01, 0.03
-_DIGITS = 9  # of angles that are compared: rounding must not choose among equal ones
 # Parts that turn by less than this short of half a turn, or beyond it, have two ways of about the same length.
 _HALF_TURN = np.radians(30.0)
 # Relative rotations of a loose part and the surface beside it, up to which the part is taken to be fixed there, like a
@@ -119,12 +114,12 @@ def consistent_turning(
     count = len(turns)
     if not count:
         return Turning(turns.copy(), turns.copy())
-    forest = _Forest(turns, adjacency)
+    forest = RotationForest(turns, adjacency)
     loose = ~np.isin(forest.labels, forest.labels[held])
     started, angles = turns, np.linalg.norm(turns, axis=1)
     if rest is not None and rest.any():
         resting = np.broadcast_to(rest, turns.shape)
-        angles = np.where(loose, angles, _relative_angles(turns, resting))
+        angles = np.where(loose, angles, relative_angles(turns, resting))
         rests = ~loose & (angles < 0.5 * np.pi)
         started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
     forest = forest.rooted(angles)
@@ -205,7 +200,7 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     ----------
     Karcher, "Riemannian center of mass and mollifier smoothing", 1977.
     """
-    forest = _Forest(turns, adjacency)
+    forest = RotationForest(turns, adjacency)
     rotations = rotation_matrices(turns)
     shares = weights / weights.sum()
     mean = np.eye(3)
@@ -219,14 +214,14 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     return np.asarray(rotation_vectors(mean[None])[0])
 
 
-def _agreeing_parts(forest: _Forest, vectors: Floats, centers: Floats, weights: Floats, loose: Bools) -> Floats:
+def _agreeing_parts(forest: RotationForest, vectors: Floats, centers: Floats, weights: Floats, loose: Bools) -> Floats:
     """Rotation vectors (m, 3) with every loose part that turns like the largest part beside it on the same branch."""
     largest = forest.labels == np.argmax(sums_by_label(forest.labels, weights))
     others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
     if not len(others):
         return vectors
     nearest = np.flatnonzero(largest)[cKDTree(centers[largest]).query(centers[others])[1]]
-    alike = _relative_angles(vectors[others], vectors[nearest]) < _ALIKE
+    alike = relative_angles(vectors[others], vectors[nearest]) < _ALIKE
     others, nearest = others[alike], nearest[alike]
     started = vectors.copy()
     started[others] = nearest_branch(vectors[others], vectors[nearest])
@@ -247,73 +242,3 @@ def _principal_axes(vectors: Floats, weights: Floats, labels: Ints) -> Floats:
     axes = np.linalg.eigh(covariances_by_label(labels, weights[:, None] * vectors, vectors))[1][:, :, 2]
     along = sums_by_label(labels, weights * np.einsum("ki,ki->k", vectors, axes[labels]))
     return np.asarray(axes * np.where(along < 0.0, -1.0, 1.0)[:, None])
-
-
-class _Forest:
-    """Minimum spanning trees of the relative rotations, one for each part."""
-
-    def __init__(self, turns: Floats, adjacency: Ints) -> None:
-        count = len(turns)
-        first, second = adjacency.T.astype(np.int32)  # scipy before 1.16 accepts no other index type
-        # Sparse graphs drop edges of cost zero.
-        cost = np.round(_relative_angles(turns[first], turns[second]), _DIGITS) + 10.0**-_DIGITS
-        tree = minimum_spanning_tree(coo_array((cost, (first, second)), shape=(count, count)).tocsr())
-        self.labels: Ints = np.asarray(connected_components(tree, directed=False)[1], dtype=np.int64)
-        self._edges: list[Ints] = [end.astype(np.int64) for end in tree.nonzero()]
-
-    def rooted(self, angles: Floats) -> _Forest:
-        """The same trees, each rooted at the element with the smallest of ``angles`` (m,)."""
-        other = copy.copy(self)
-        other._root(angles)
-        return other
-
-    def _root(self, angles: Floats) -> None:
-        count, labels = len(angles), self.labels
-        by_angle = np.lexsort((np.round(angles, _DIGITS), labels))
-        self.roots: Ints = by_angle[np.searchsorted(labels[by_angle], np.arange(labels.max() + 1))]
-        # An extra node joins all roots, so that one breadth-first search covers every part.
-        rows, columns = self._edges
-        rows = np.concatenate([rows, np.full(len(self.roots), count)])
-        columns = np.concatenate([columns, self.roots])
-        joined = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1)).tocsr()
-        order, self._parents = (found.astype(np.int64) for found in breadth_first_order(joined, count, directed=False))
-        depth = _depths(order, self._parents)
-        self._by_depth = order[np.argsort(depth[order], kind="stable")]
-        self._starts = np.searchsorted(depth[self._by_depth], np.arange(2, depth.max() + 2))
-
-    def carried(self, values: Floats, align: Callable[[Floats, Floats], Floats]) -> Floats:
-        """Walk outward from the roots, level by level, aligning each value with that of its parent."""
-        result = values.copy()
-        every = self._by_depth[self._starts[0] :]
-        if np.array_equal(align(values[every], values[self._parents[every]]), values[every]):
-            return result  # each agrees with its parent as it is
-        for begin, end in pairwise(self._starts):
-            members = self._by_depth[begin:end]
-            result[members] = align(values[members], result[self._parents[members]])
-        return result
-
-
-def _depths(order: Ints, parents: Ints) -> Ints:
-    """Depth of every node in the tree, by pointer doubling; ``order`` is breadth-first."""
-    ancestor = parents.copy()
-    ancestor[order[0]] = order[0]
-    depth = np.ones(len(parents), dtype=np.int64)
-    depth[order[0]] = 0
-    while True:
-        further = depth[ancestor]
-        if not further.any():
-            return depth
-        depth = depth + further
-        ancestor = ancestor[ancestor]
-
-
-def _relative_angles(first: Floats, second: Floats) -> Floats:
-    """(k,) angles between the rotations of two lists of rotation vectors, from their quaternions."""
-    scalars, vectors = zip(*(_half_angle(vector) for vector in (first, second)), strict=True)
-    inner = scalars[0] * scalars[1] + np.einsum("ki,ki->k", vectors[0], vectors[1])
-    return np.asarray(2.0 * np.arccos(np.clip(np.abs(inner), 0.0, 1.0)))
-
-
-def _half_angle(vectors: Floats) -> tuple[Floats, Floats]:
-    half = 0.5 * np.linalg.norm(vectors, axis=1)
-    return np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * vectors

@@ -16,7 +16,10 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..numerics.grouped_sums import means_by_label
 from ..numerics.rising import risen
+from ..triangles.closed_volume import ClosedComponents
+from ..triangles.deformation import pressed_shares
 from ..triangles.geometry import edge_lengths
+from ..triangles.topology import sides, unique_edges
 
 # How far edges may leave the interval between their key lengths for the sake of a component's volume, relative; 99th
 # percentile. It is too small to be seen, and real pairs need up to 0.0015.
@@ -28,6 +31,11 @@ _SUFFERS = 0.01
 # third. From the second on they are looked at fully; in between gradually, so that motions have no corner there.
 _SMALL_CORRECTION, _LARGE_CORRECTION = 0.005, 0.01
 _SHORTEST = 1e-9  # cube units
+# Where from the first part of a component's surface on up to the second is pressed flat, nothing tells any more how it
+# turns; it goes straight if that keeps its lengths.
+_PRESSED = 0.02, 0.2
+# Of a component's volume: nor is more of it given up on a way of its own than straight lines would cost.
+_MOST_LOST = 0.002
 
 
 class LengthsFirst:
@@ -37,12 +45,14 @@ class LengthsFirst:
     ----------
     key0, key1 : (n, 3)
         Positions in the two keys, cube units.
-    edges : (e, 2) int64
-        Edges of the mesh.
+    covering : tuple of (m, 3) int64 and (m,)
+        Triangles that cover the surface evenly, and what each counts.
+    springs : (s, 2) int64
+        Further edges of the mesh.
     labels : (n,) int64
         Component of each vertex.
-    reversal : (components,)
-        How surely each component is mirrored or turned inside out from one key to the other, 0..1: it goes straight,
+    closed : ClosedComponents
+        Those that enclose a volume. One that is mirrored or turned inside out from one key to the other goes straight,
         since no motion of its own leads there.
     halfway : (n, 3)
         The middle of the straight lines between the keys before the motion of the whole was taken out, cube units.
@@ -51,8 +61,18 @@ class LengthsFirst:
     """
 
     def __init__(
-        self, key0: Floats, key1: Floats, edges: Ints, labels: Ints, reversal: Floats, halfway: Floats, free: Bools
+        self,
+        key0: Floats,
+        key1: Floats,
+        covering: tuple[Ints, Floats],
+        springs: Ints,
+        labels: Ints,
+        closed: ClosedComponents,
+        halfway: Floats,
+        free: Bools,
     ) -> None:
+        triangles, shares = covering
+        edges = unique_edges(np.concatenate([sides(triangles), springs]))
         ends = [edge_lengths(key, edges) for key in (key0, key1)]
         usable = np.minimum(*ends) > _SHORTEST
         counts = np.bincount(labels[edges[usable, 0]], minlength=int(labels.max(initial=-1)) + 1)
@@ -65,8 +85,10 @@ class LengthsFirst:
         self._labels = labels
         self._key0, self._key1 = key0, key1
         self._label = labels[self._edges[:, 0]]
-        self._reversal = reversal
-        self._straight_share = np.ones(len(reversal))
+        self._closed, self._volumes = closed, [closed.volumes(key) for key in (key0, key1)]
+        self._reversal = closed.reversal(key0, key1)
+        self._pressed = risen(pressed_shares(key0, key1, triangles, shares, labels), *_PRESSED)
+        self._straight_share = np.ones(len(self._reversal))
         self._is_one = np.count_nonzero(counts) == 1
         # Of each component, how many edges lie beyond its percentile.
         self._beyond = counts - 1 - np.ceil(_PERCENTILE * (counts - 1)).astype(np.int64)
@@ -100,9 +122,9 @@ class LengthsFirst:
         """(n, 3) a shape whose components go straighter where their own way costs lengths that the straight one keeps.
 
         Where all edges of a component keep between their key lengths in the straight blend, as those of what is
-        flattened do, it is as good a way as any. Nor may edges suffer more on average than they do there. The same goes
-        for the straight ``lines`` (n, 3) between the keys before the motion of the whole was taken out: those of
-        something that is sheared keep its lengths, although they turn it.
+        flattened do, it is as good a way as any, and better where it also keeps the volume. Nor may edges suffer more
+        on average than they do there. The same goes for the straight ``lines`` (n, 3) between the keys before the
+        motion of the whole was taken out: those of something that is sheared keep its lengths, although they turn it.
         """
         straight = (1.0 - time) * self._key0 + time * self._key1
         excesses = self._excesses(shape)
@@ -110,7 +132,10 @@ class LengthsFirst:
         need = np.maximum((1.0 - _allowed(worse)) * self._straight_share, self._reversal)
         can_go_straight = self._can_go_straight * self._straight_share
         excess = self._excess(excesses)
-        need = np.maximum(need, (1.0 - _allowed(excess)) * can_go_straight)
+        if can_go_straight.any():
+            costs = np.maximum(1.0 - _allowed(excess), self._pressed)
+            costs = np.maximum(costs, 1.0 - _tolerable(self._lost_volume(shape, straight, time), _MOST_LOST))
+            need = np.maximum(need, costs * can_go_straight)
         if need.any():
             shape = shape + need[self._labels][:, None] * (straight - shape)
             excess = self._excess(self._excesses(shape))
@@ -119,6 +144,13 @@ class LengthsFirst:
             costs *= _tolerable(self._excess(self._excesses(lines)))
             shape = shape + costs[self._labels][:, None] * (lines - shape)
         return shape
+
+    def _lost_volume(self, shape: Floats, straight: Floats, time: float) -> Floats:
+        """(components,) by how much more a shape misses the interpolated volume than the straight one, relative."""
+        wanted = (1.0 - time) * self._volumes[0] + time * self._volumes[1]
+        missed = [np.abs(self._closed.volumes(positions) - wanted) for positions in (shape, straight)]
+        largest = np.maximum(*np.abs(self._volumes))
+        return np.where(largest > 0.0, (missed[0] - missed[1]) / np.where(largest > 0.0, largest, 1.0), 0.0)
 
     def lost(self, shape: Floats) -> float:
         """99th percentile of how far the edges that move leave the interval between their key lengths, relative."""
@@ -166,7 +198,7 @@ def _allowed(excess: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 + beyond**2 / (1.0 + beyond)))
 
 
-def _tolerable(excess: Floats) -> Floats:
+def _tolerable(excess: Floats, most: float = _MOST_EXCESS) -> Floats:
     """(c,) 1 where there is no excess, a quarter at the largest, falling without a corner."""
-    beyond = np.maximum(excess, 0.0) / _MOST_EXCESS
+    beyond = np.maximum(excess, 0.0) / most
     return np.asarray(1.0 / (1.0 + beyond**2) ** 2)

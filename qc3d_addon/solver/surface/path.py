@@ -20,7 +20,8 @@ from ..numerics.symmetric_matrices import Stretch
 from ..settings import StretchLaw
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.deformation import TriangleDeformation
-from ..triangles.topology import among, face_adjacency, sides, unique_edges, vertex_components
+from ..triangles.geometry import edge_lengths
+from ..triangles.topology import edges_without_triangle, face_adjacency, sides, unique_edges, vertex_components
 from .anchors import ScrewAnchors
 from .end_rates import (
     EndCorrection,
@@ -129,7 +130,7 @@ class SurfacePath:
         self.still = still[self.group]
         self._free = ~still
         self._springs = edges_without_triangle(triangles, self.group[embedding.pair.edges], self.deformation.faces)
-        self._lengths = [np.linalg.norm(_spans(key, self._springs), axis=1) for key in (self._key0, key1)]
+        self._lengths = [edge_lengths(key, self._springs) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self.components = labels[self.group]
         owners = labels[usable.faces[:, 0]]
@@ -139,9 +140,10 @@ class SurfacePath:
         self._closed = ClosedComponents(faces, labels)
         self._volumes = [self._closed.volumes(key) for key in (self._key0, key1)]
         weights = sums_by_label(self.group, embedding.weights, count)
-        edges = unique_edges(np.concatenate([sides(triangles), self._springs]))
-        reversal, halfway = self._closed.reversal(self._key0, key1), embedding.straight(0.5)[self.vertices]
-        self._lengths_first = LengthsFirst(self._key0, key1, edges, labels, reversal, halfway, self._free)
+        covering, halfway = (triangles, shares), embedding.straight(0.5)[self.vertices]
+        self._lengths_first = LengthsFirst(
+            self._key0, key1, covering, self._springs, labels, self._closed, halfway, self._free
+        )
         turns = mean_turns(self.turning, usable.weights, owners, int(labels.max(initial=-1)) + 1)
         self._screws = ScrewAnchors(self._key0, key1, ~self._free, weights, labels, turns)
         self._places = PartPlaces(
@@ -160,7 +162,7 @@ class SurfacePath:
             usable,
             self._springs,
             self._closed,
-            (triangles, shares),
+            covering,
             self._free,
             self._key0,
             self._anchor_weights + self._line_weights,
@@ -302,16 +304,3 @@ class SurfacePath:
             change = hermite(time, *(slope[rows] for slope in self._correction.turns))
         rotations = self._moving_turning.part(part).at(time, change)
         return tangents_of(rotations, self._moving_tangents[part]).transpose(2, 0, 1), stretch
-
-
-def _spans(positions: Floats, edges: Ints) -> Floats:
-    return np.asarray(positions[edges[:, 1]] - positions[edges[:, 0]])
-
-
-def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
-    """(k, 2) edges of no usable triangle: loose edges, and edges of triangles without an area."""
-    every = unique_edges(np.concatenate([sides(faces), wires]))
-    held = unique_edges(sides(usable))
-    span = int(every.max(initial=0)) + 1
-    covered = among(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
-    return np.asarray(every[~covered])

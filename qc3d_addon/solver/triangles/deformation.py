@@ -17,6 +17,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..numerics.blocks import in_blocks
+from ..numerics.grouped_sums import means_by_label
+from ..numerics.rising import risen
 from ..numerics.rotations import rotation_vectors
 from ..numerics.symmetric_matrices import Stretch
 from .geometry import areas, hat_gradients, planar_jacobians, tangent_bases
@@ -29,6 +31,7 @@ _ROUNDING = 2.5e-7
 # Nor do those that become flatter by this factor from one key to the other, as in a mesh that is pressed flat: there a
 # millionth of the size would turn them by any angle.
 _PRESSED = 1e-3
+_HARDLY_PRESSED = 1e-1  # gradually, from this factor on
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +84,7 @@ class TriangleDeformation:
             in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1)
         )
         usable = (double0 > _least_area(key0, double0, longest0)) & (double1 > _least_area(key1, double1, longest1))
-        flatness = np.stack([double0 * longest1**2, double1 * longest0**2])
-        usable &= flatness.min(axis=0) > _PRESSED * flatness.max(axis=0)
+        usable &= _kept(double0 * longest1**2, double1 * longest0**2) > _PRESSED
         faces = faces if usable.all() else faces[usable]
 
         def parts(rows: slice) -> tuple[Floats, ...]:
@@ -116,6 +118,27 @@ class TriangleDeformation:
         """Only which triangles there are, and what they weigh."""
         nothing = Stretch(np.empty((0, 2)), np.empty((0, 2, 2)))
         return replace(self.without_directions(), stretch=nothing, turns=np.empty((0, 3)), angles=np.empty(0))
+
+
+def pressed_shares(key0: Floats, key1: Floats, faces: Ints, shares: Floats, labels: Ints) -> Floats:
+    """(components,) the part of each component's surface, 0..1, that is pressed flat in one key and not in the other.
+
+    What is pressed flat is unusable for a ``TriangleDeformation``; what nearly is counts in part. ``labels`` (n,) are
+    the components of the vertices, and ``shares`` (m,) what the triangles (m, 3) count.
+    """
+    double0, double1 = (2.0 * areas(key, faces) for key in (key0, key1))
+    longest0, longest1 = (in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1))
+    kept = _kept(double0 * longest1**2, double1 * longest0**2)
+    depth = -np.log(np.clip(kept, _PRESSED, _HARDLY_PRESSED))
+    degree = risen(depth, -np.log(_HARDLY_PRESSED), -np.log(_PRESSED))
+    owners, count = labels[faces[:, 0]], int(labels.max(initial=-1)) + 1
+    return means_by_label(owners, degree[:, None], shares * (double0 + double1), count)[:, 0]
+
+
+def _kept(first: Floats, second: Floats) -> Floats:
+    """(m,) the smaller of two positive numbers over the larger; 1 where both are zero."""
+    most = np.maximum(first, second)
+    return np.where(most > 0.0, np.minimum(first, second) / np.where(most > 0.0, most, 1.0), 1.0)
 
 
 def _least_area(key: Floats, double: Floats, longest: Floats) -> Floats:

@@ -117,6 +117,15 @@ def unique_edges(edges: Ints) -> Ints:
     return np.stack([codes // span, codes % span], axis=1)
 
 
+def edges_without_triangle(faces: Ints, wires: Ints, usable: Ints) -> Ints:
+    """(k, 2) edges of no usable triangle: loose edges, and edges of triangles without an area."""
+    every = unique_edges(np.concatenate([sides(faces), wires]))
+    held = unique_edges(sides(usable))
+    span = int(every.max(initial=0)) + 1
+    covered = among(every[:, 0] * span + every[:, 1], held[:, 0] * span + held[:, 1])
+    return np.asarray(every[~covered])
+
+
 def open_loops(faces: Ints) -> tuple[Ints, Ints]:
     """The vertices (k,) of boundary edges, which have one triangle, and for each the label of its boundary loop."""
     edges = sides(faces)

@@ -186,9 +186,9 @@ ENTRIES = (
     Entry("large", (_module("large"),), "an hour", printed=(f"{GUIDE}/limits.md",)),
     Entry(
         "compression",
-        (_module("compression", "--data", "{data}"),),
-        "an hour",
-        printed=("docs/reference/compression.md",),
+        (_module("compression", "--data", "{data}", "--write"),),
+        "minutes",
+        tables=(("docs/reference/compression.md", "benchmarks/compression.py"),),
         needs="shapes",
     ),
 )  # fmt: skip

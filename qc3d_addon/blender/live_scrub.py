@@ -21,8 +21,9 @@ from ..solver.errors import InputError
 from . import compat
 from .keys import chain_keys, shape_keys
 from .kinds import keys_of, mesh_of, shape_keys_of
+from .store.chain import Chain
 from .store.mesh_data import key_coordinates, set_key_coordinates
-from .store.records import Chain, Record
+from .store.records import Record
 
 if TYPE_CHECKING:
     from ..solver.frames.preview import PreviewCurve

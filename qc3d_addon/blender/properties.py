@@ -21,7 +21,8 @@ from .heat_map import heat_map
 from .heat_map.colors import MEASURE_ITEMS
 from .kinds import expect, keys_of, shape_keys_of
 from .store import checks
-from .store.records import Chain, Record
+from .store.chain import Chain
+from .store.records import Record
 
 
 def _show_measure(settings: "ObjectSettings", context: bpy.types.Context) -> None:

@@ -16,7 +16,8 @@ from qc3d_addon.blender.bake.plan import plan_bake, write_bake
 from qc3d_addon.blender.bake.request import BakeRequest
 from qc3d_addon.blender.bake.suggested_keys import made_keys, sculpted_between
 from qc3d_addon.blender.keys.leftovers import leftovers
-from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.store.chain import Chain
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.frames.task import carry_out
 from qc3d_addon.solver.support.progress import finish

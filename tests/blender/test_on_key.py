@@ -14,7 +14,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from qc3d_addon.blender.keys import chain_shapes
-from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.store.chain import Chain
+from qc3d_addon.blender.store.records import Record
 
 pytestmark = pytest.mark.usefixtures("quick_map")
 
@@ -170,6 +171,17 @@ def test_muted_it_shows_nothing_of_them(figure: bpy.types.Object, shown: Shown) 
     np.testing.assert_array_equal(at(figure, shown, 0.4), rest)
     lean.mute = False
     np.testing.assert_array_equal(at(figure, shown, 0.4), seen)
+
+
+def test_baked_while_muted_that_is_said(figure: bpy.types.Object, capfd: pytest.CaptureFixture[str]) -> None:
+    key = figure.data.shape_keys.key_blocks["Lean"]
+    bake(count=2)
+    assert "muted" not in capfd.readouterr().out
+    key.mute = True
+    bake(count=2)
+    assert "'Lean' is muted, and its in-betweens with it; unmute it to see them play." in capfd.readouterr().out
+    bake(count=2, play_on="slider")  # which plays whether the key is muted or not
+    assert "'Lean' is muted" not in capfd.readouterr().out
 
 
 def test_a_chain_goes_through_keys_at_values_of_the_last(

@@ -16,7 +16,8 @@ from qc3d_addon.blender.bake.run import bake_object
 from qc3d_addon.blender.bake.timeline import keyed, keys_on_timeline
 from qc3d_addon.blender.keys.control import slider_path, value_path
 from qc3d_addon.blender.keys.double_motion import double_motion
-from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.store.chain import Chain
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.blender.ui.panels import QC3D_PT_inbetweens
 from qc3d_addon.solver.errors import InputError
 from qc3d_addon.solver.settings import FrameOptions

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.store.chain import Chain
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.settings import DENSE_STEPS
 
 SLIDER = "Basis_to_Bent"

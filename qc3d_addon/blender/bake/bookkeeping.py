@@ -13,10 +13,11 @@ from ..heat_map import heat_map
 from ..keys.chain_keys import base_key
 from ..kinds import keys_of
 from ..store import id_properties, kept_measures, kept_shapes
+from ..store.chain import Chain
 from ..store.kept_measures import Measures
 from ..store.kept_shapes import Shapes
 from ..store.mesh_data import key_coordinates
-from ..store.records import PROPERTY, Chain, Record
+from ..store.records import PROPERTY, Record
 
 
 def remember(

@@ -14,7 +14,8 @@ import bpy
 from ...solver.errors import InputError, naming_pair
 from ..kinds import keys_of
 from ..store import checks, mesh_data
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from .plan import kept_map
 from .plan_again import request_again
 

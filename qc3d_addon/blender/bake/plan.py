@@ -22,7 +22,8 @@ from ..keys.leftovers import leftovers, sentence
 from ..keys.sculpted import Sculpted
 from ..kinds import keys_of
 from ..store import checks, mesh_data, names
-from ..store.records import Chain, KeptMap, Record
+from ..store.chain import Chain
+from ..store.records import KeptMap, Record
 from ..store.renames import digest
 from ..store.summaries import Summary
 from . import bookkeeping, colliders
@@ -209,6 +210,8 @@ def write_bake(plan: Plan, outcome: Outcome) -> BakeResult:
         notes += unknown
         left = sentence(leftovers(keys, {*made_keys(keys), *chain.keys.values()}))
         notes += [left] if left else []
+        if control.is_key and keys.key_blocks[control.name].mute:
+            notes.append(f"'{control.name}' is muted, and its in-betweens with it; unmute it to see them play.")
         if obj.show_only_shape_key:
             notes.append(f"'{obj.name}' shows only its active key; unpin it to see the in-betweens play.")
         report = {

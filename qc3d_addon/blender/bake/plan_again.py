@@ -12,7 +12,7 @@ from ...solver.errors import InputError
 from ..keys import chain_keys
 from ..kinds import keys_of
 from ..store import checks
-from ..store.records import Chain
+from ..store.chain import Chain
 from .plan import Plan, plan_bake
 from .request import PREVIEW_STEPS, BakeRequest
 

@@ -13,7 +13,8 @@ from ...solver.errors import InputError
 from ..keys.leftovers import leftovers
 from ..kinds import shape_keys_of
 from ..store import combined_keys
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 
 # Riggers and other programs name sculpted in-betweens by the key's name and a percentage, perhaps with a separator.
 # One digit is rather the number of a version.

@@ -15,8 +15,8 @@ from ..heat_map import heat_map
 from ..keys import chain_keys, chain_shapes, drivers
 from ..kinds import keys_of, mesh_of, shape_keys_of
 from ..store import id_properties, names
+from ..store.chain import Chain
 from ..store.mesh_data import set_key_coordinates
-from ..store.records import Chain
 
 _LEAST_STEPS = 24  # with so many, straight lines miss a rotation by 90 degrees by 0.05 % of the radius
 

@@ -14,7 +14,7 @@ from ...solver.files.atomic import replacing, require_room
 from .. import compat, native_files
 from ..keys import chain_keys, drivers, slider
 from ..kinds import keys_of, mesh_of, present
-from ..store.records import Chain
+from ..store.chain import Chain
 from .absolute_copy import copied
 
 # Bytes per vertex or face corner: position or normal in each frame; index and position once; texture coordinates.

@@ -15,7 +15,8 @@ from ..bake import bookkeeping
 from ..keys import chain_keys, drivers, shape_keys
 from ..keys.control import Control, value_path
 from ..kinds import expect, keys_of, present
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from . import remove
 
 

@@ -16,8 +16,9 @@ from ..keys import chain_keys, shape_keys
 from ..keys.sculpted import Sculpted
 from ..kinds import keys_of
 from ..store import kept_measures, names
+from ..store.chain import Chain
 from ..store.mesh_data import key_coordinates
-from ..store.records import Chain, Record
+from ..store.records import Record
 from ..store.summaries import Summary
 from .mirror_image import MirrorImage, mirror_image
 

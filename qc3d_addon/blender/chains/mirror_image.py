@@ -75,7 +75,7 @@ def mirror_image(obj: bpy.types.Object, use_topology: bool) -> MirrorImage:
     """
     from scipy.spatial import cKDTree
 
-    from ...solver.triangles.mirror_symmetry import known_partners
+    from ...solver.triangles.mirror_symmetry import known_partners, likely_partners
     from ...solver.triangles.mirror_topology import topology_partners
 
     mesh = mesh_of(obj)
@@ -83,8 +83,10 @@ def mirror_image(obj: bpy.types.Object, use_topology: bool) -> MirrorImage:
     rest = key_coordinates(obj, reference.name)
     ends = np.empty(2 * len(mesh.edges), dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)
-    partners = known_partners(rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64))
+    places, edges = rest.astype(np.float64), ends.reshape(-1, 2).astype(np.int64)
+    partners = known_partners(places, edges)
     if use_topology:
+        partners = likely_partners(places, edges, partners)
         corners = np.empty(len(mesh.loops), dtype=np.int32)
         mesh.loops.foreach_get("vertex_index", corners)
         starts = np.empty(len(mesh.polygons), dtype=np.int32)
@@ -95,7 +97,8 @@ def mirror_image(obj: bpy.types.Object, use_topology: bool) -> MirrorImage:
     has_partner = partners >= 0
     lost = np.flatnonzero(~has_partner)
     if len(lost) > _MOST_LOST * len(rest):
-        remedy = "mend the Basis" if use_topology else "mend the Basis, or choose Topology"
+        remedy = "make the Basis symmetric with Mesh > Snap to Symmetry in Edit Mode"
+        remedy += "" if use_topology else ", or choose Topology"
         raise InputError(f"{len(lost)} of {len(rest)} vertices have no mirror image across x = 0; {remedy}.")
     partners[lost] = cKDTree(rest).query(rest[lost] * [-1.0, 1.0, 1.0])[1]
     return MirrorImage(rest, partners, has_partner)

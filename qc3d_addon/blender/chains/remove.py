@@ -14,7 +14,8 @@ from ..heat_map import heat_map
 from ..keys import chain_keys, drivers, own_keyframes, shape_keys
 from ..keys.control import Control
 from ..kinds import keys_of
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 
 
 def remove_chain(obj: bpy.types.Object, record: Record, chain: Chain) -> list[str]:

@@ -14,8 +14,9 @@ from ..keys import chain_keys, shape_keys, sides
 from ..keys.sculpted import Sculpted
 from ..kinds import keys_of
 from ..store import names
+from ..store.chain import Chain
 from ..store.mesh_data import key_coordinates
-from ..store.records import Chain, Record
+from ..store.records import Record
 from ..store.renames import digest
 
 

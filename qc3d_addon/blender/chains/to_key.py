@@ -14,7 +14,8 @@ from ..bake import bookkeeping
 from ..keys import chain_shapes, shape_keys
 from ..kinds import keys_of, mesh_of
 from ..store import checks, kept_measures, names
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from . import remove
 
 

@@ -235,8 +235,12 @@ def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
 
 def _require(obj: bpy.types.Object, chosen: Sequence[str]) -> None:
     keys = keys_of(obj)
-    if not 2 <= len(set(chosen)) == len(chosen) <= _MOST_KEYS:
-        raise InputError(f"Combinations are of two or three different keys, and {len(chosen)} were named.")
+    if not 2 <= len(chosen) <= _MOST_KEYS:
+        named = f"{len(chosen)} {'was' if len(chosen) == 1 else 'were'}"
+        raise InputError(f"Combinations are of two or three keys, and {named} named; name those that are on at once.")
+    twice = next((name for name in chosen if list(chosen).count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"'{twice}' is named twice; name different keys.")
     for name in chosen:
         if name not in keys.key_blocks:
             raise InputError(f"There is no shape key '{name}' on '{obj.name}'; choose from those of the mesh.")

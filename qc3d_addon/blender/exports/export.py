@@ -18,7 +18,8 @@ from .. import native_files
 from ..keys import chain_keys, chain_shapes
 from ..kinds import keys_of, mesh_of, present
 from ..store import checks
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from . import fbx_files, gltf_files, usd_files
 from .in_betweens import InBetweens
 from .stand_ins import playing_keys

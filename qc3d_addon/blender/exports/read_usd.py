@@ -15,9 +15,10 @@ from ..bake import bookkeeping
 from ..keys import chain_shapes, shape_keys
 from ..kinds import keys_of, mesh_of
 from ..store import checks
+from ..store.chain import Chain
 from ..store.mesh_data import key_coordinates
 from ..store.names import chain_label
-from ..store.records import Chain, Record
+from ..store.records import Record
 from . import usd_files
 
 

@@ -14,8 +14,8 @@ from .. import compat
 from ..keys import chain_keys, chain_shapes, drivers, shape_keys
 from ..keys.control import value_path
 from ..kinds import keys_of, present
+from ..store.chain import Chain
 from ..store.mesh_data import set_key_coordinates
-from ..store.records import Chain
 
 
 @contextmanager

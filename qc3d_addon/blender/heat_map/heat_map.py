@@ -27,8 +27,8 @@ from ..keys.control import Control
 from ..kinds import expect, keys_of, mesh_of, present
 from ..store import id_properties, kept_measures
 from ..store import stored_values as stored
+from ..store.chain import Chain
 from ..store.kept_measures import MEASURES
-from ..store.records import Chain
 from .colors import Scale, linear, scale_between, scale_of
 
 if TYPE_CHECKING:

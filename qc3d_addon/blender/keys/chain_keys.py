@@ -10,8 +10,8 @@ import bpy
 
 from ...solver.errors import InputError
 from ..kinds import keys_of, present
+from ..store.chain import Chain
 from ..store.id_properties import has
-from ..store.records import Chain
 from . import drivers
 from .control import Control, path_of, value_path
 

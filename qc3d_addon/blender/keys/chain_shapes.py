@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...solver.errors import QC3DError
 from ..kinds import keys_of, mesh_of
+from ..store.chain import Chain
 from ..store.mesh_data import key_coordinates, shown_coordinates
-from ..store.records import Chain
 from .chain_keys import all_owned_keys, base_key
 
 

@@ -14,7 +14,7 @@ import bpy
 
 from ...solver.errors import InputError
 from ..store import id_properties
-from ..store.records import Chain
+from ..store.chain import Chain
 
 
 class Control(NamedTuple):

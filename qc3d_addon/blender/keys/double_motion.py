@@ -10,7 +10,7 @@ import bpy
 
 from .. import compat
 from ..kinds import expect, keys_of
-from ..store.records import Chain
+from ..store.chain import Chain
 from . import drivers
 from .chain_keys import owned_keys
 from .control import value_path

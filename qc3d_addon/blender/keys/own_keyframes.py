@@ -13,7 +13,7 @@ from contextlib import ExitStack
 import bpy
 
 from .. import compat
-from ..store.records import Chain
+from ..store.chain import Chain
 from .control import value_path
 
 

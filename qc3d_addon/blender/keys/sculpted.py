@@ -13,10 +13,10 @@ import numpy as np
 from ...solver.errors import InputError
 from ..kinds import keys_of, mesh_of
 from ..store import kept_shapes
+from ..store.chain import Chain
 from ..store.chain_values import LEAST_DISTANCE
 from ..store.kept_shapes import Shape, Shapes
 from ..store.mesh_data import key_coordinates
-from ..store.records import Chain
 from .chain_keys import base_key, owned_keys
 
 T = TypeVar("T")

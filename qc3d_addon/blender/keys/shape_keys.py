@@ -16,9 +16,9 @@ from ...solver.errors import InputError
 from .. import compat
 from ..kinds import keys_of
 from ..store import names
+from ..store.chain import Chain
 from ..store.chain_values import LEAST_DISTANCE, keyframe_values
 from ..store.mesh_data import key_coordinates, set_key_coordinates
-from ..store.records import Chain
 from . import drivers, slider
 from .chain_keys import base_key, control_of, owned_keys
 from .control import Control, key_path, value_path

@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import compat
 from ..store import id_properties
-from ..store.records import Chain
+from ..store.chain import Chain
 from .control import Control, slider_path
 
 Keyframes = Sequence[tuple[float, float]]  # frames and values

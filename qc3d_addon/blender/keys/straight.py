@@ -21,8 +21,9 @@ from .. import compat
 from ..kinds import keys_of, present, shape_keys_of
 from ..store import id_properties
 from ..store import stored_values as stored
+from ..store.chain import Chain
 from ..store.names import MAX_STEPS
-from ..store.records import Chain, Record
+from ..store.records import Record
 from . import drivers
 from .chain_keys import all_owned_keys, control_of, owned_keys
 from .control import mute_path, value_path

@@ -14,7 +14,8 @@ from ...solver.errors import InputError, QC3DError
 from ..chains import absolute_copy, alembic, keyframes, mirror, remove, to_key
 from ..kinds import keys_of, present
 from ..store import checks
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from .common import SLIDER, OperatorMixin, Status, chosen_chain, end_previews, poll_chains, report_error
 
 _MOST_FRAMES = 100_000

@@ -16,7 +16,8 @@ from ..keys import straight
 from ..kinds import keys_of, present
 from ..properties import panel_keys, settings_of
 from ..store import checks
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 
 # The return values of an operator.
 Status = set[Literal['RUNNING_MODAL', 'CANCELLED', 'FINISHED', 'PASS_THROUGH', 'INTERFACE']]

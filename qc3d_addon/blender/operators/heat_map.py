@@ -16,7 +16,7 @@ from ..heat_map.colors import MEASURE_ITEMS
 from ..keys.chain_keys import control_of, owned_keys
 from ..kinds import keys_of, mesh_of, present
 from ..store import checks
-from ..store.records import Chain
+from ..store.chain import Chain
 from ..store.summaries import WorstPlace
 from .common import SLIDER, Status, chosen_chain, poll_chains
 

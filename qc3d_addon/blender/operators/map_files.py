@@ -15,7 +15,8 @@ from ..bake import map_files
 from ..kinds import present
 from ..properties import fill_panel, settings_of
 from ..store import checks
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from .chains import ChainWork
 from .common import SLIDER, Status, poll_active_object, poll_chains, report_error
 

@@ -12,7 +12,7 @@ import bpy
 from ...solver.errors import InputError
 from ..kinds import keys_of, mesh_of, shape_keys_of
 from . import records
-from .records import Chain
+from .chain import Chain
 
 
 def object_problem(obj: bpy.types.Object | None) -> str | None:

@@ -45,7 +45,6 @@ TEXTS = {
     "Collection of objects that the in-betweens must not enter, such as eyeballs under lids": "中间帧不得进入的物体集合,例如眼睑下的眼球",
     "Colliders": "碰撞物体",
     "Color the mesh by how much the in-betweens stretch it, or hide the colors again": "按中间帧的拉伸程度为网格着色,或重新隐藏颜色",
-    "Combine": "组合",
     "Combine Keys": "组合形态键",
     "Combine Keys…": "组合形态键…",
     "Compute the map between the shape keys again and keep it, so that later bakes take less time": "重新计算形态键之间的映射并保留,使以后的烘焙更快",

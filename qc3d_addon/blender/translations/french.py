@@ -45,7 +45,6 @@ TEXTS = {
     "Collection of objects that the in-betweens must not enter, such as eyeballs under lids": "Collection d'objets où les intermédiaires ne doivent pas entrer, comme les globes oculaires sous les paupières",
     "Colliders": "Objets de collision",
     "Color the mesh by how much the in-betweens stretch it, or hide the colors again": "Colorer le maillage selon l'étirement des intermédiaires, ou masquer de nouveau les couleurs",
-    "Combine": "Combiner",
     "Combine Keys": "Combiner les clés",
     "Combine Keys…": "Combiner les clés…",
     "Compute the map between the shape keys again and keep it, so that later bakes take less time": "Recalculer la carte entre les clés et la garder, pour que les prochains précalculs durent moins longtemps",

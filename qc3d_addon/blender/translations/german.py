@@ -45,7 +45,6 @@ TEXTS = {
     "Collection of objects that the in-betweens must not enter, such as eyeballs under lids": "Sammlung von Objekten, in die die Zwischenformen nicht eindringen dürfen, etwa Augäpfel unter Lidern",
     "Colliders": "Kollisionsobjekte",
     "Color the mesh by how much the in-betweens stretch it, or hide the colors again": "Das Mesh danach färben, wie stark die Zwischenformen es dehnen, oder die Farben wieder verbergen",
-    "Combine": "Kombinieren",
     "Combine Keys": "Schlüssel kombinieren",
     "Combine Keys…": "Schlüssel kombinieren…",
     "Compute the map between the shape keys again and keep it, so that later bakes take less time": "Die Abbildung zwischen den Formschlüsseln neu berechnen und behalten, sodass spätere Backvorgänge schneller sind",

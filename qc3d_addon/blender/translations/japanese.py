@@ -45,7 +45,6 @@ TEXTS = {
     "Collection of objects that the in-betweens must not enter, such as eyeballs under lids": "中割りが入ってはいけないオブジェクトのコレクション。まぶたの下の眼球など",
     "Colliders": "コライダー",
     "Color the mesh by how much the in-betweens stretch it, or hide the colors again": "中割りによる伸びでメッシュを色分け、または色を隠す",
-    "Combine": "結合",
     "Combine Keys": "キーを結合",
     "Combine Keys…": "キーを結合…",
     "Compute the map between the shape keys again and keep it, so that later bakes take less time": "シェイプキー間のマップを計算し直して保持。以後のベイクが速くなります",

@@ -45,7 +45,6 @@ TEXTS = {
     "Collection of objects that the in-betweens must not enter, such as eyeballs under lids": "Colección de objetos en los que las intermedias no deben entrar, como los globos oculares bajo los párpados",
     "Colliders": "Colisionadores",
     "Color the mesh by how much the in-betweens stretch it, or hide the colors again": "Colorear la malla según cuánto la estiran las intermedias, o volver a ocultar los colores",
-    "Combine": "Combinar",
     "Combine Keys": "Combinar formas",
     "Combine Keys…": "Combinar formas…",
     "Compute the map between the shape keys again and keep it, so that later bakes take less time": "Calcular de nuevo el mapa entre las formas y conservarlo, para que las próximas capturas tarden menos",

@@ -9,9 +9,11 @@ import bpy
 from ..keys.chain_keys import control_of
 from ..kinds import expect, keys_of, present
 from ..properties import newest_first, settings_of
-from ..store.records import Chain
+from ..store.chain import Chain
+from .panel_texts import fitted
 
 _LEAST_ROWS, _MOST_ROWS = 2, 5
+_OF_NAME, _OF_ICON = 0.65, 0.2  # of the width of a row
 
 
 class QC3D_UL_bakes(bpy.types.UIList):
@@ -38,8 +40,9 @@ class QC3D_UL_bakes(bpy.types.UIList):
         if index is None or index >= len(chains):
             return
         control = control_of(obj, chains[index])
-        row = layout.split(factor=0.6)
-        row.label(text=control.name, icon='SHAPEKEY_DATA' if control.is_key else 'PROPERTIES')
+        row = layout.split(factor=_OF_NAME)
+        name = fitted(context, control.name, _OF_NAME - _OF_ICON)
+        row.label(text=name, icon='SHAPEKEY_DATA' if control.is_key else 'PROPERTIES')
         if control.problem is None:
             row.prop(*control.shown, text="", slider=True)
         else:

@@ -11,7 +11,7 @@ from ..combinations import verdicts
 from ..kinds import keys_of, present
 from ..operators.combinations import QC3D_OT_combine_keys, QC3D_OT_judge_pairs, QC3D_OT_remove_combination
 from ..store import checks, combined_keys
-from .panel_texts import draw_sentence
+from .panel_texts import draw_sentence, fitted
 from .panels import IN_THE_SIDEBAR, QC3D_PT_inbetweens
 
 _MOST_ROWS = 12
@@ -45,7 +45,8 @@ class QC3D_PT_combinations(bpy.types.Panel):
         for one in made:
             row = layout.row(align=True)
             outdated = combined_keys.is_outdated(keys_of(obj), one)
-            row.label(text=one.label, icon='ERROR' if outdated else 'CHECKMARK')
+            label = " + ".join(fitted(context, name, 0.6 / len(one.keys)) for name in one.keys)
+            row.label(text=label, icon='ERROR' if outdated else 'CHECKMARK')
             again = row.operator(QC3D_OT_combine_keys.bl_idname, text="", icon='FILE_REFRESH')
             again.first, again.second, again.third = (*one.keys, "")[:3]
             again.find_order = False
@@ -67,8 +68,9 @@ def _draw_verdicts(
     needing = [one for one in found if not one.adding_is_right and {one.outer, one.inner} not in made]
     for one in needing[:_MOST_ROWS]:
         row = layout.row(align=True)
-        row.label(text=f"{one.outer} + {one.inner}: {one.distance:.1%}", icon='ERROR')
-        button = row.operator(QC3D_OT_combine_keys.bl_idname, text="Combine")
+        outer, inner = (fitted(context, name, 0.35) for name in (one.outer, one.inner))
+        row.label(text=f"{outer} + {inner}: {one.distance:.1%}", icon='ERROR')
+        button = row.operator(QC3D_OT_combine_keys.bl_idname, text="", icon='MOD_BOOLEAN')
         button.first, button.second = one.outer, one.inner
     left = len(needing) - _MOST_ROWS
     if left > 0:

@@ -31,7 +31,8 @@ from ..operators.map_files import QC3D_OT_save_map
 from ..operators.straight import QC3D_OT_straight
 from ..properties import settings_of
 from ..store import checks, kept_measures, records
-from ..store.records import Chain, Record
+from ..store.chain import Chain
+from ..store.records import Record
 from ..store.summaries import Summary
 from . import bake_list
 from .panel_texts import draw_sentence
@@ -160,9 +161,10 @@ def _draw_result(
             icon='ERROR' if problems else 'CHECKMARK',
         )
     if result.played is not None:
-        volume = "" if result.played.volume is None else f", volume within {result.played.volume:.1%}"
         facts.label(text=f"Plays the motion within {result.played.distance:.2%} of the size")
-        facts.label(text=f"Lengths hold within {result.played.stretch:.1%}{volume}")
+        facts.label(text=f"Lengths hold within {result.played.stretch:.1%}")
+        if result.played.volume is not None:
+            facts.label(text=f"Volume holds within {result.played.volume:.1%}")
     if result.residual is None:
         facts.label(text="Straight lines, without a map")
     else:

@@ -104,7 +104,7 @@ def _draw_choices(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     look = layout.column()
     look.row().prop(settings, "play_on", expand=True)
     look.prop(settings, "mode")
-    look.row().prop(settings, "quality", expand=True)
+    look.prop(settings, "quality")  # as buttons, Fine and Finest would both be cut off to Fin…
     look.prop_search(settings, "colliders", bpy.data, "collections")
     frames = layout.column(align=True)
     at_frames = len(settings.via) > 0 and settings.via_timing == "frame"

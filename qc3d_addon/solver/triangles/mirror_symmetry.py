@@ -14,6 +14,7 @@ from ..errors import InputError
 
 TOLERANCE = 1e-4  # of the bounding-box diagonal: what modeling by hand and saving in single precision leave
 
+_LIKELY = 0.3  # of the mean length of a vertex's edges; beyond a half, other vertices are as near
 _MOST_TOGETHER = 8  # candidates looked at for each vertex; no ordinary mesh has more vertices in one place
 
 
@@ -72,6 +73,57 @@ def known_partners(points: Floats, edges: Ints, axis: int = 0, tolerance: float 
         _settle(partners, {int(vertex): near[vertex, candidates[vertex]].tolist() for vertex in together}, edges)
     known = np.flatnonzero(partners >= 0)
     partners[known[partners[partners[known]] != known]] = -1
+    return np.asarray(partners)
+
+
+def likely_partners(points: Floats, edges: Ints, known: Ints, axis: int = 0) -> Ints:
+    """More mirror partners of a shape that is symmetric only roughly, such as a scanned or a sculpted head.
+
+    Two vertices are likely partners if each is the nearest one to the other's mirror image, within 0.3 of the mean
+    length of its edges, and if all edges of one lead to partners of where the edges of the other lead.
+
+    Parameters
+    ----------
+    points : (n, 3)
+        The shape, roughly symmetric about the plane where the coordinate ``axis`` is 0.
+    edges : (e, 2) int64
+        Edges of the mesh.
+    known : (n,) int64
+        Known partners, and -1 elsewhere. They are kept.
+    axis : int
+        0, 1 or 2.
+
+    Returns
+    -------
+    (n,) int64
+        Partners, -1 for vertices without one; the partner of a vertex's partner is that vertex.
+
+    Examples
+    --------
+    >>> line = np.array([[-1.1, 0, 0], [0.02, 0, 0], [1.0, 0.1, 0]])
+    >>> likely_partners(line, np.array([[0, 1], [1, 2]]), np.array([-1, -1, -1]))
+    array([2, 1, 0])
+    """
+    count = len(points)
+    if not len(edges):
+        return known
+    images = points.copy()
+    images[:, axis] *= -1.0
+    distances, found = cKDTree(points).query(images)
+    nearest = np.reshape(found, count)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    ends = np.bincount(edges.ravel(), minlength=count)
+    mean = np.bincount(edges.ravel(), weights=np.repeat(lengths, 2), minlength=count) / np.maximum(ends, 1)
+    fits = (distances < _LIKELY * mean) & (known < 0) & (known[nearest] < 0)
+    partners: Ints = np.where(known >= 0, known, np.where(fits, nearest, -1))
+    paired = np.flatnonzero(partners >= 0)
+    partners[paired[partners[partners[paired]] != paired]] = -1
+    codes = np.sort(edges, axis=1) @ [count, 1]
+    there = np.sort(partners[edges], axis=1)
+    is_edge = (there[:, 0] >= 0) & np.isin(there @ [count, 1], codes)
+    good = np.bincount(edges.ravel(), weights=np.repeat(is_edge, 2), minlength=count) == ends
+    likely = (known < 0) & (partners >= 0) & good & (ends > 0)
+    partners[(known < 0) & ~(likely & likely[partners])] = -1
     return np.asarray(partners)
 
 

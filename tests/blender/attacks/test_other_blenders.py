@@ -19,7 +19,8 @@ from qc3d_addon.blender import compat, live_scrub
 from qc3d_addon.blender.heat_map import heat_map
 from qc3d_addon.blender.keys import chain_keys, chain_shapes
 from qc3d_addon.blender.store import kept_measures
-from qc3d_addon.blender.store.records import Chain, Record
+from qc3d_addon.blender.store.chain import Chain
+from qc3d_addon.blender.store.records import Record
 from qc3d_addon.solver.settings import FitOptions
 
 from ..test_panel_results import drawn

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats, Ints
-from qc3d_addon.solver.triangles.mirror_symmetry import known_partners
+from qc3d_addon.solver.triangles.mirror_symmetry import known_partners, likely_partners
 from qc3d_addon.solver.triangles.mirror_topology import topology_partners
 
 
@@ -43,6 +43,27 @@ def test_from_the_middle_outwards(columns: int, rows: int, seed: int) -> None:
     assert (known_partners(bumpy, np.empty((0, 2), dtype=np.int64)) == known).mean() > 0.5
     found = partners_of(places, turned, known)
     np.testing.assert_allclose(places[found] * [-1.0, 1.0, 1.0], places, atol=1e-12)
+
+
+@given(st.integers(2, 6), st.integers(2, 6), st.integers(0, 2**32 - 1))
+def test_likely_ones_start_where_no_place_is_exact(columns: int, rows: int, seed: int) -> None:
+    """Vertices that are off by a tenth of an edge find their partners, and one of them that is far off by topology."""
+    points, quads = grid(columns, rows)
+    random = np.random.default_rng(seed)
+    shortest = min(1.0 / columns, 1.0 / rows)
+    rough = points + random.uniform(-0.1, 0.1, points.shape) * shortest
+    rough[random.integers(len(points))] += 0.6 * shortest
+    sides = np.concatenate([quads[:, [corner, (corner + 1) % 4]] for corner in range(4)])
+    edges = np.unique(np.sort(sides, axis=1), axis=0)
+    nothing = np.full(len(points), -1)
+    likely = likely_partners(rough, edges, nothing)
+    right = np.array([int(np.abs(points - place * [-1.0, 1.0, 1.0]).sum(axis=1).argmin()) for place in points])
+    sure = likely >= 0
+    assert np.array_equal(likely[sure], right[sure])
+    if sure[edges].all(axis=1).any():
+        assert np.array_equal(partners_of(rough, quads.tolist(), likely), right)
+    assert sure.any() or columns * rows < 9
+    assert np.array_equal(likely_partners(points, edges, right), right)
 
 
 def test_what_is_built_otherwise_has_none() -> None:

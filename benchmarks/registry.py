@@ -175,6 +175,13 @@ ENTRIES = (
         "minutes",
         tables=_written("speed.md", "stages", "--small"),
     ),
+    Entry(
+        "methods",
+        (_module("stages", "--methods", "--frames", "3", "--write"),),
+        "minutes",
+        tables=_written("speed.md", "stages", "--methods"),
+        needs="shapes",
+    ),
     Entry("keys", (_module("keys", "--write"),), "minutes", tables=_written("speed.md", "keys"), needs="shapes"),
     Entry("clicks", (_module("clicks", "--write"),), "minutes", tables=_written("speed.md", "clicks")),
     Entry("fit", (_module("fit"),), "minutes", printed=(f"{SCIENCE}/speed.md",), needs="shapes"),

@@ -5,6 +5,7 @@
     python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS       the stages and the warm bake
     python -m benchmarks.stage_run CASE ENGINE IN-BETWEENS one   also one frame and its floor
     python -m benchmarks.stage_run CASE yardstick                fTetWild with its own defaults on the first shape
+    python -m benchmarks.stage_run CASE METHOD IN-BETWEENS method    all in-betweens by a method of benchmarks.methods
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ def main(arguments: list[str]) -> None:
     case, engine = arguments[:2]
     if engine == "yardstick":
         found = yardstick(case)
+    elif arguments[3:] == ["method"]:
+        found = by_method(case, engine, int(arguments[2]))
     else:
         found = stages(case, "tetwild" if engine == "tetwild" else "delaunay",
              int(arguments[2]), arguments[3:] == ["one"])
@@ -153,6 +156,20 @@ def _written(faces: Ints, frames: Floats) -> float:
         key = obj.shape_key_add(from_mix=False)
         key.points.foreach_set("co", frame.astype(np.float32).ravel())
     return clock.perf_counter() - started
+
+
+def by_method(case: str, method: str, count: int) -> dict[str, Any]:
+    """Processor seconds of one method for all in-betweens, from two arrays; None where its package is missing."""
+    from .methods import Contest
+
+    faces, key0, key1 = stage_cases.load(case)
+    contest = Contest(faces, key0, key1, np.linspace(0.0, 1.0, count + 2), {})
+    used = clock.process_time()
+    try:
+        contest.run(method)
+    except ModuleNotFoundError:
+        return {"processor": None}
+    return {"processor": clock.process_time() - used}
 
 
 def yardstick(case: str) -> dict[str, Any]:

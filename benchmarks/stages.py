@@ -5,6 +5,7 @@
     python -m benchmarks.stages                                  # real pairs, both engines, against the yardstick
     python -m benchmarks.stages --growth                         # the limb that a sphere becomes, 1k to 200k vertices
     python -m benchmarks.stages --small                          # meshes of 8 to 800 vertices
+    python -m benchmarks.stages --methods                        # real pairs by other methods, processor seconds
     python -m benchmarks.stages --against HEAD~3 [--cases ...]   # two revisions in turn, ratios by stage
     python -m benchmarks.stages --write                          # the tables of docs/science/speed.md
 
@@ -19,12 +20,15 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from .catalogue import DATA, ROOT
-from .report import table, write_between_markers
+from .methods import METHODS
+from .report import NAMES, table, write_between_markers
 from .stage_cases import LIMITS, SIZES, SMALL
 
 DOCUMENT = ROOT / "docs/science/speed.md"
@@ -40,17 +44,20 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--frames", type=int, default=24, help="in-betweens (default: 24)")
     parser.add_argument("--growth", action="store_true", help="the limb in all sizes, delaunay engine")
     parser.add_argument("--small", action="store_true", help="meshes of 8 to 800 vertices of several kinds")
+    parser.add_argument("--methods", action="store_true", help="other methods beside QC3D, one thread each")
     parser.add_argument("--against", metavar="REVISION", help="compare with another revision, alternating")
     parser.add_argument("--write", action="store_true", help=f"put the table into {DOCUMENT.name}")
     chosen = parser.parse_args(argv)
     if chosen.against:
         compare(chosen.against, chosen.cases, chosen.engines, chosen.frames)
         return
-    text = growth(chosen.frames) if chosen.growth else small(chosen.frames) if chosen.small else pairs(chosen)
+    option = next((name for name in ("growth", "small", "methods") if getattr(chosen, name)), None)
+    tables: dict[str, Callable[[int], str]]
+    tables = {"growth": growth, "small": small, "methods": partial(by_method, chosen.cases)}
+    text = pairs(chosen) if option is None else tables[option](chosen.frames)
     print(text)
     if chosen.write:
-        option = " --growth" if chosen.growth else " --small" if chosen.small else ""
-        write_between_markers(DOCUMENT, text, f"benchmarks/stages.py{option}")
+        write_between_markers(DOCUMENT, text, "benchmarks/stages.py" + ("" if option is None else f" --{option}"))
 
 
 def run(case: str, *arguments: object, root: Path = ROOT) -> dict[str, Any]:
@@ -105,6 +112,20 @@ def small(frames: int) -> str:
         rows.append([kind, count, f"{middle['tetrahedra']:.0f}", f"{middle['cold_processor']:.2f}"])
         rows[-1] += [f"{middle['cold']:.2f}", f"{max(one['folds'] for one in runs)}"]
     return table(["kind", "vertices", "tetrahedra", "processor s", "s", "folds"], rows)
+
+
+def by_method(cases: list[str], frames: int) -> str:
+    """The table of what other methods take for the same in-betweens, and how much that is beside mode natural."""
+    rows = []
+    for case in cases:
+        seconds = {method: run(case, method, frames, "method")["processor"] for method in METHODS}
+        ours = seconds["natural"]
+        cells = (
+            "-" if value is None else f"{value:.2f}" if value is ours else f"{value:.2f} ({value / ours:.2g})"
+            for value in seconds.values()
+        )
+        rows.append([case.replace(":", " "), *cells])
+    return table(["pair", *(NAMES[method] for method in METHODS)], rows)
 
 
 def compare(revision: str, cases: list[str], engines: list[str], frames: int) -> None:

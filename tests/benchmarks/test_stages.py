@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import stages
+from benchmarks.methods import METHODS
 from benchmarks.stage_cases import SMALL, limb, load
 from qc3d_addon.solver.triangles.closed_volume import ClosedComponents
 
@@ -31,6 +32,15 @@ def test_every_stage_is_timed() -> None:
     assert 0.0 < found["floor_alone"] < found["one"]
     assert found["folds"] == 0
     assert found["peak_mb"] > 10.0
+
+
+def test_other_methods_are_timed_beside_ours() -> None:
+    lines = stages.by_method(["limb:100"], 1).splitlines()
+    assert [len(line.split("|")) for line in lines] == [len(METHODS) + 3] * 3
+    cells = dict(zip(METHODS, lines[2].split("|")[2:-1], strict=True))
+    assert float(cells["natural"]) > 0.0
+    seconds, _, ratio = cells["poisson"].rstrip(") ").partition("(")
+    assert float(ratio) == pytest.approx(float(seconds) / float(cells["natural"]), abs=0.05)
 
 
 @pytest.mark.parametrize("case", SMALL)

@@ -127,9 +127,10 @@ class Window:
         """What Blender wrote to its terminal."""
         return (self.folder / "log.txt").read_text(errors="replace")
 
-    def ask(self, code: str) -> Any:  # noqa: ANN401 - whatever JSON holds
-        """Run Python code in Blender; the value of its last line, as JSON can hold it."""
+    def ask(self, code: str, patience: float = PATIENCE) -> Any:  # noqa: ANN401 - whatever JSON holds
+        """Run Python code in Blender, for so many seconds at most; the value of its last line, as JSON can hold it."""
         assert self._socket is not None
+        self._socket.settimeout(patience)
         self._socket.sendall(code.encode() + b"\0")
         answer = b""
         while not answer.endswith(b"\0"):

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from .harness import Window, redraws
+from .harness import PATIENCE, Window, redraws
 
 BUTTON = "qc3d.live_scrub"
 SLIDER = "Basis_to_Bend and twist"
@@ -125,12 +125,13 @@ def test_edit_mode_and_undo_in_it(baked: Window, save: bool) -> None:
     baked.wait_for(f"names() == {OWN + MADE}")
 
 
-def test_every_redraw_shows_where_the_slider_is(window: Window) -> None:
+def lean_ball(window: Window, segments: int, rings: int, count: int) -> None:
+    """A ball that leans, baked with so many in-betweens, and what moves its slider and notes what is drawn."""
     window.ask(
         f"""
-bpy.ops.mesh.primitive_uv_sphere_add(segments=84, ring_count=83)
+bpy.ops.mesh.primitive_uv_sphere_add(segments={segments}, ring_count={rings})
 ball = bpy.context.active_object
-assert len(ball.data.vertices) == {VERTICES}
+assert len(ball.data.vertices) == {segments * (rings - 1) + 2}
 ball.shape_key_add(name='Basis')
 lean = ball.shape_key_add(name='Lean', from_mix=False)
 lean.value = 0.0
@@ -141,7 +142,7 @@ lean.points.foreach_set('co', (rest + np.maximum(rest[:, 2:], 0) ** 2 * np.float
 arm().hide_set(True)
 view()[1].spaces.active.shading.type = 'SOLID'
 with inside('WINDOW'):
-    bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Lean', count=3)
+    bpy.ops.qc3d.bake_inbetweens(play_on='slider', from_key='Basis', to_key='Lean', count={count})
 
 class Drag:
     '''Moves the slider a little between redraws, and notes where it is and what is shown at each.'''
@@ -167,6 +168,10 @@ class Drag:
 Drag.watched = int(np.argmax(rest[:, 2] - abs(rest[:, 1]) + 0.5 * rest[:, 0]))
 """
     )
+
+
+def test_every_redraw_shows_where_the_slider_is(window: Window) -> None:
+    lean_ball(window, 84, 83, 3)
     rates: dict[bool, list[float]] = {False: [], True: []}
     for is_on in (False, True, False, True):
         window.ask("drag = Drag()")
@@ -190,3 +195,38 @@ keys = ball.data.shape_keys.key_blocks
     assert len(seen) > 3
     for place, shown in seen:
         assert abs(shown - dense[round(100 * place)]) < 1e-4
+
+
+def test_a_hundred_thousand_vertices_are_evaluated_often_enough(window: Window) -> None:
+    lean_ball(window, 317, 317, 1)
+    timed = """
+def step(number):
+    ball['Basis_to_Lean'] = number % 40 / 40
+    ball.update_tag()
+    bpy.context.view_layer.update()
+    mesh = ball.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh.corner_normals[0].vector.copy()
+    return mesh.vertices[Drag.watched].co.x
+
+def timed(steps):
+    import time
+    before = time.perf_counter(), time.process_time()
+    places = [step(number) for number in range(steps)]
+    return (time.perf_counter() - before[0]) / steps, (time.process_time() - before[1]) / steps, len(set(places))
+"""
+    window.ask(timed)
+    found: dict[bool, tuple[float, float, int]] = {}
+    for is_on in (False, True):
+        window.ask("step(0)")
+        found[is_on] = window.ask("timed(40)")
+        window.ask("drag = Drag()")
+        with redraws(window) as gaps:
+            time.sleep(3.0)
+        assert len(window.ask("drag.stop()")) > 0
+        clock, processor, places = found[is_on]
+        print(
+            f"100174 vertices, {'with' if is_on else 'without'} the preview: {1e3 * clock:.0f} ms a step on the clock, "
+            f"{1e3 * processor:.0f} ms of the processors; {len(gaps) / sum(gaps):.1f} redraws a second"
+        )
+        assert places > 35
+        window.ask("with inside('WINDOW'): bpy.ops.qc3d.live_scrub()", 10.0 * PATIENCE)

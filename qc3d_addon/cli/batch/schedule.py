@@ -10,7 +10,7 @@ from contextlib import suppress
 
 from ...solver.errors import InputError
 from .job import Job
-from .orders import Ended, Order
+from .orders import Ended, HowEnded, Order
 from .pools import Pool, lost
 from .records import State
 
@@ -72,16 +72,24 @@ class Schedule:
             if future.done() and not future.cancelled():
                 with suppress(Exception):  # it was stopped
                     self._end(job, future.result(), goes_on=False)
+        begun = {job.number for job in self._running.values()}
         for job in self._jobs:
             if job.number not in self.ended:
-                self._end(job, Ended("stopped"), goes_on=False)
+                # Of what was done on another machine, word may not have come yet.
+                told = self._known(job, "done") if job.number in begun else None
+                self._end(job, told or Ended("stopped"), goes_on=False)
 
     def _begin(self, job: Job) -> None:
-        known = self._state.record(job)
+        known = self._known(job, "resumed")
         if known is None:
             self._running[self._pool.submit(self._order(job))] = job
         else:
-            self._end(job, Ended("resumed", None, known.seconds, known.peak_memory_mb))
+            self._end(job, known)
+
+    def _known(self, job: Job, how: HowEnded) -> Ended | None:
+        """The end of a job by its record, as one of that kind; None if it has none."""
+        known = self._state.record(job)
+        return None if known is None else Ended(how, None, known.seconds, known.peak_memory_mb)
 
     def _end(self, job: Job, ended: Ended, goes_on: bool = True) -> None:
         self.ended[job.number] = ended

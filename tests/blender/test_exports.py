@@ -31,6 +31,10 @@ Shown = Callable[..., np.ndarray]
 @pytest.fixture
 def played(figure: bpy.types.Object) -> bpy.types.Object:
     """The figure, moved, with in-betweens on its key Lean, which a custom property drives and keyframes move."""
+    return animated(figure)
+
+
+def animated(figure: bpy.types.Object) -> bpy.types.Object:
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = FIRST, LAST
     figure.location, figure.rotation_euler = (1.0, 2.0, 3.0), (0.3, 0.2, 0.1)
@@ -46,6 +50,25 @@ def played(figure: bpy.types.Object) -> bpy.types.Object:
     keys = {"from_key": "Basis", "to_key": "Lean", "mode": "linear", "easing": "ease-in-out"}
     assert bpy.ops.qc3d.bake_inbetweens(**keys, count=3) == {"FINISHED"}
     return figure
+
+
+def halve(figure: bpy.types.Object) -> None:
+    """Cut off what is behind y = 0, and let a Mirror modifier show it."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.bisect(plane_co=(0.0, 0.0, 0.0), plane_no=(0.0, 1.0, 0.0), clear_inner=True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for key in figure.data.shape_keys.key_blocks:
+        values = np.empty(3 * len(key.points), dtype=np.float32)
+        key.points.foreach_get("co", values)
+        at = values.reshape(-1, 3)
+        rest = figure.data.shape_keys.reference_key
+        base = np.empty_like(values)
+        rest.points.foreach_get("co", base)
+        at[np.abs(base.reshape(-1, 3)[:, 1]) < 1e-5, 1] = 0.0
+        key.points.foreach_set("co", values)
+    mirror = figure.modifiers.new("Mirror", 'MIRROR')
+    mirror.use_axis = (False, True, False)
 
 
 def motion(obj: bpy.types.Object, shown: Shown) -> np.ndarray:
@@ -175,11 +198,10 @@ def test_fbx(played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
     assert largest_distance(found, truth, "FBX") < STRAIGHT_PARTS
 
 
-def assert_gltf_moves(path: Path, obj: bpy.types.Object, truth: np.ndarray) -> None:
+def assert_gltf_moves(path: Path, rest: np.ndarray, truth: np.ndarray) -> None:
     times, found, base = _gltf_motion(path)
     np.testing.assert_allclose(times, np.arange(FIRST, LAST + 1) / bpy.context.scene.render.fps, atol=1e-6)
     # glTF's y is up, and it splits vertices: those of Blender are found by where they are in the base.
-    rest = rest_of(obj)
     number = np.linalg.norm(rest[None] - base[:, None], axis=2).argmin(axis=1)
     assert np.abs(rest[number] - base).max() < 1e-5
     assert largest_distance(found, truth[:, number], "glTF") < ROUNDING
@@ -189,7 +211,7 @@ def test_gltf(played: bpy.types.Object, shown: Shown, tmp_path: Path) -> None:
     truth = motion(played, shown)
     path = tmp_path / "figure.glb"
     assert export(played, path) == []
-    assert_gltf_moves(path, played, truth)
+    assert_gltf_moves(path, rest_of(played), truth)
 
 
 class TestSliders:
@@ -238,7 +260,7 @@ class TestSliders:
         truth = motion(slid, shown)
         path = tmp_path / "figure.glb"
         assert export(slid, path) == []
-        assert_gltf_moves(path, slid, truth)
+        assert_gltf_moves(path, rest_of(slid), truth)
 
     def test_everything_is_as_it_was(
         self, slid: bpy.types.Object, state: Callable[[], dict[str, object]], tmp_path: Path
@@ -309,6 +331,72 @@ def test_everything_is_as_it_was(
     for ending in (".usda", ".fbx", ".glb"):
         export(played, tmp_path / f"figure{ending}")
     assert state() == before
+
+
+class TestHalves:
+    """A half is exported as the whole that its Mirror modifier shows, with the same vertices as in Blender."""
+
+    @pytest.fixture
+    def half(self, figure: bpy.types.Object) -> bpy.types.Object:
+        halve(figure)
+        return animated(figure)
+
+    @pytest.fixture
+    def rest(self, half: bpy.types.Object, shown: Shown) -> np.ndarray:
+        for key in half.data.shape_keys.key_blocks:
+            key.mute = True
+        found = shown(half).copy()
+        for key in half.data.shape_keys.key_blocks:
+            key.mute = False
+        return found
+
+    @pytest.mark.parametrize("ending", [".usda", ".fbx", ".glb"])
+    def test_the_whole_moves(
+        self, ending: str, half: bpy.types.Object, rest: np.ndarray, shown: Shown, tmp_path: Path
+    ) -> None:
+        truth = motion(half, shown)
+        assert truth.shape[1] > 1.5 * len(half.data.vertices)
+        path = tmp_path / f"figure{ending}"
+        assert export(half, path) == []
+        if ending == ".glb":
+            assert_gltf_moves(path, rest, truth)
+            return
+        names, found = read_usd(path) if ending == ".usda" else read_fbx(path, rest)
+        assert names == (["Lean", "Stretch"] if ending == ".usda" else ["Lean 13", "Stretch 1"])
+        assert largest_distance(found, truth, f"half, {ending}") < STRAIGHT_PARTS
+
+    def test_across_two_planes_one_of_them_another_object_s(
+        self, figure: bpy.types.Object, shown: Shown, tmp_path: Path
+    ) -> None:
+        halve(figure)
+        animated(figure)
+        plane = bpy.data.objects.new("Plane", None)
+        bpy.context.collection.objects.link(plane)
+        plane.location, plane.rotation_euler = (4.0, 2.5, 3.0), (0.2, 0.1, 0.4)
+        bpy.context.view_layer.update()
+        figure.modifiers.new("Beside", 'MIRROR').mirror_object = plane
+        truth = motion(figure, shown)
+        export(figure, tmp_path / "figure.usda")
+        assert largest_distance(read_usd(tmp_path / "figure.usda")[1], truth, "two planes") < STRAIGHT_PARTS
+
+    def test_everything_is_as_it_was(
+        self, half: bpy.types.Object, state: Callable[[], dict[str, object]], tmp_path: Path
+    ) -> None:
+        bpy.context.scene.frame_set(5)
+        before, mesh = state(), half.data.name
+        for ending in (".usda", ".fbx", ".glb"):
+            export(half, tmp_path / f"figure{ending}")
+        assert state() == before
+        assert half.data.name == mesh
+        assert half.modifiers[0].show_viewport
+        assert half.modifiers[0].show_render
+
+    def test_what_the_modifier_cuts_is_refused(self, played: bpy.types.Object, tmp_path: Path) -> None:
+        modifier = played.modifiers.new("Mirror", 'MIRROR')
+        modifier.use_bisect_axis[0] = True
+        with pytest.raises(InputError, match="cuts its mesh by Bisect"):
+            export(played, tmp_path / "figure.usda")
+        assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("how", ["in views", "in this view layer"])
@@ -418,21 +506,7 @@ def test_the_operator(played: bpy.types.Object, tmp_path: Path) -> None:
 def test_alembic_has_the_same_vertices_in_every_frame(half: bool, figure: bpy.types.Object, tmp_path: Path) -> None:
     """Modifiers are evaluated in every frame, and a seam that opens would split vertices."""
     if half:
-        bpy.ops.object.mode_set(mode="EDIT")
-        bpy.ops.mesh.select_all(action="SELECT")
-        bpy.ops.mesh.bisect(plane_co=(0.0, 0.0, 0.0), plane_no=(0.0, 1.0, 0.0), clear_inner=True)
-        bpy.ops.object.mode_set(mode="OBJECT")
-        for key in figure.data.shape_keys.key_blocks:
-            values = np.empty(3 * len(key.points), dtype=np.float32)
-            key.points.foreach_get("co", values)
-            at = values.reshape(-1, 3)
-            rest = figure.data.shape_keys.reference_key
-            base = np.empty_like(values)
-            rest.points.foreach_get("co", base)
-            at[np.abs(base.reshape(-1, 3)[:, 1]) < 1e-5, 1] = 0.0
-            key.points.foreach_set("co", values)
-        mirror = figure.modifiers.new("Mirror", 'MIRROR')
-        mirror.use_axis = (False, True, False)
+        halve(figure)
     figure.modifiers.new("Subdivision", 'SUBSURF')
     assert bpy.ops.qc3d.bake_inbetweens(from_key="Basis", to_key="Lean", count=3) == {"FINISHED"}
     path = tmp_path / "figure.abc"

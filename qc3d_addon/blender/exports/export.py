@@ -23,6 +23,7 @@ from ..store.records import Record
 from . import fbx_files, gltf_files, usd_files
 from .in_betweens import InBetweens
 from .stand_ins import playing_keys
+from .wholes import as_whole
 
 # In-betweens per key in USD and FBX. Programs that read them interpolate linearly, and with so many, straight lines
 # miss a rotation by 90 degrees by 0.2 % of the radius.
@@ -69,10 +70,14 @@ def export(obj: bpy.types.Object | None, path: Path, density: int = DENSITY) -> 
     with replacing_all(path, beside=True) as (unfinished,), _alone(obj):
         native_files.require_short(unfinished, path)
         if suffix == ".glb":
-            return _export_gltf(obj, chains, unfinished, path, size)
+            with as_whole(obj):
+                return _export_gltf(obj, chains, unfinished, path, size)
         with playing_keys(obj, chains) as playing:
             found = [in_betweens(obj, chain, density, key) for chain, key in zip(chains, playing, strict=True)]
-            _export_in_betweens(obj, found, unfinished, path, size)
+            with as_whole(obj) as whole:
+                if whole is not None:
+                    found = [one._replace(offsets=whole.offsets(one.offsets)) for one in found]
+                _export_in_betweens(obj, found, unfinished, path, size)
     return []
 
 

@@ -40,14 +40,14 @@ def mirror_planes(obj: bpy.types.Object, shapes: Sequence[NDArray[Any]]) -> tupl
     """
     size = max((float(np.ptp(shape, axis=0).max(initial=0.0)) for shape in shapes if len(shape)), default=0.0)
     planes = []
-    for modifier, axis, is_bisected in _mirrored_axes(obj):
+    for modifier, axis, is_bisected in mirrored_axes(obj):
         plane = _plane(obj, modifier, axis, size)
         if not is_bisected or _is_on_one_side(plane, shapes, max(plane.reach, modifier.bisect_threshold)):
             planes.append(plane)
     return tuple(planes)
 
 
-def _mirrored_axes(obj: bpy.types.Object) -> Iterator[tuple[bpy.types.MirrorModifier, int, bool]]:
+def mirrored_axes(obj: bpy.types.Object) -> Iterator[tuple[bpy.types.MirrorModifier, int, bool]]:
     """Each Mirror modifier with each of its axes, and whether it cuts the mesh there."""
     for modifier in obj.modifiers:
         if isinstance(modifier, bpy.types.MirrorModifier) and (modifier.show_viewport or modifier.show_render):

@@ -13,7 +13,7 @@ from ..arrays import Bools, Floats, Ints
 from ..triangles.geometry import cross_product
 from .box_tree import Budget, TriangleTree
 
-_TOUCHING = 1e-10  # triangles that intersect less deeply than this, relative to the surface's size, only touch
+TOUCHING = 1e-10  # triangles that intersect less deeply than this, relative to the surface's size, only touch
 _WORK_OF_A_TEST = 20  # the cost of testing two triangles, in comparisons of two boxes
 _ODD = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: multiplicative hashing (Knuth 1973, section 6.4)
 
@@ -98,7 +98,7 @@ class CrossingSearch:
         corners = np.stack([coordinate.take(self._corners) for coordinate in np.ascontiguousarray(points.T)])
         one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
         low, high = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
-        depth = _TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
+        depth = TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
         # Triangles smaller than the depth cannot cross: for example those of a part that is squashed to a point.
         tiny = np.flatnonzero(high[0] - low[0] <= 0.5 * depth)
         if len(tiny):
@@ -157,7 +157,7 @@ def _cross(first: Floats, second: Floats, depth: float) -> Bools:
         met = np.flatnonzero(~((heights > 0.0).all(axis=0) | (heights < 0.0).all(axis=0)))
         near, pair = near[met], (pair[0][:, :, met], pair[1][:, :, met])
     first, second = pair
-    result[near] = _pierced(first, second, depth) | _pierced(second, first, depth)
+    result[near] = pierced(first, second, depth) | pierced(second, first, depth)
     return result
 
 
@@ -176,8 +176,11 @@ def _heights(triangles: Floats, others: Floats, depth: float) -> Floats:
     return heights
 
 
-def _pierced(triangles: Floats, others: Floats, depth: float) -> Bools:
-    """(k,) whether an edge of ``others`` passes through the inside of ``triangles``, all (3, 3, k)."""
+def pierced(triangles: Floats, others: Floats, depth: float) -> Bools:
+    """(k,) whether an edge of ``others`` passes through the inside of ``triangles``, all (3, 3, k).
+
+    They are component-major: coordinate, corner, triangle. What is less deep than ``depth`` only touches.
+    """
     heights = _heights(triangles, others, depth)
     result = np.zeros(len(heights[0]), dtype=bool)
     for start in range(3):

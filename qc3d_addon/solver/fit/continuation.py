@@ -40,13 +40,6 @@ class FollowedPath:
     maps: Floats
     turns: Floats
 
-    def ending_with(self, mesh: TetMesh, mapped: Floats) -> FollowedPath:
-        """The same way, with another, nearby map (N, 3) at its end."""
-        rotations = polar_decomposition(mesh.jacobians(mapped)).rotation
-        return FollowedPath(
-            np.concatenate([self.maps[:-1], mapped[None]]), nearest_branch(rotation_vectors(rotations), self.turns)
-        )
-
 
 def path_to(path: SurfacePath, key1: Floats) -> list[Floats]:
     """Shapes (n, 3) along the way to the second key, in cube units, evenly spaced in time; the last is the key itself.

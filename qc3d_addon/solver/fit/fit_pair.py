@@ -129,7 +129,7 @@ def _meeting(embedding: Embedding, options: FitOptions, seconds: dict[str, float
         yield Progress("fit", 0.0)
         path, targets = way.result()
     with timed(seconds, "fit"):
-        followed = yield from staged("fit", meet_keys(embedding, volume.mesh, volume.landmarks, targets))
+        volume, followed = yield from staged("fit", meet_keys(embedding, volume, targets))
         followed = way_on_lattice(volume.mesh, followed)
     yield Progress("fit", 1.0)
     parts = (followed.maps, followed.turns, options, embedding, volume.notes, seconds, path)

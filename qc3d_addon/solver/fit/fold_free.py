@@ -70,15 +70,17 @@ class FoldFreeFitter:
         (N, 3)
             Values of a map without folds.
         """
-        values = start
+        values, before = start, 1.0
         misfit = self.misfit(start, targets)
         for _ in range(most_iterations):
             energy, gradient, blocks = self._model(values, misfit)
             step = self._newton_step(gradient, blocks)
             slope = float((gradient * step).sum())
             length, values = self._line_search(values, step, energy, slope, misfit)
-            if length == 0.0 or (length == 1.0 and self._settled(-slope, energy)):
+            # After a shortened step, a short full one only tells that a tetrahedron which limited it opens up again.
+            if length == 0.0 or (length == before == 1.0 and self._settled(-slope, energy)):
                 break
+            before = length
         return values
 
     def _settled(self, decrease: float, energy: float) -> bool:

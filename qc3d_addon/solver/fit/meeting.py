@@ -9,24 +9,26 @@ and then the landmarks' weight is increased until they are met.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ..arrays import Bools, Floats
 from ..keys.embedding import Embedding
 from ..support.progress import told
-from ..tets.mesh import TetMesh
-from .continuation import FollowedPath, follow_path
+from .continuation import FollowedPath, follow_path, turns_along
 from .fold_free import LANDMARK_WEIGHT
+from .local_meeting import Aim, meet_rest
 from .own_crossings import crossing_vertices
 from .stiff_landmarks import StiffFitter
+from .volume import Volume
 
 MET = 1e-4  # of the diagonal: a vertex is met if its distance is at most this
 _WEIGHT_ON_THE_WAY = 1e6
 _WEIGHTS = (1e7, 1e8, 1e9, 1e10)
 _ITERATIONS = 12  # at most, for each weight
-_MORE_ROUNDS, _FEW, _PROGRESS = 6, 0.005, 0.9
+# So many weights all vertices go through; if no more than these are left then, the tetrahedra around them do the rest.
+_AT_LEAST, _FEW = 2, 0.05
 # Of the diagonal. Beyond this distance, the force of a landmark no longer grows. Otherwise landmarks that cannot be
 # met, as where a key crosses itself, would keep others from being met.
 _STRONGEST_AT = 1e-3
@@ -35,17 +37,15 @@ _WEIGHT_AT_CROSSINGS = 1e-2  # relative to that of other landmarks
 
 
 def meet_keys(
-    embedding: Embedding, mesh: TetMesh, landmarks: csr_array, targets: Sequence[Floats]
-) -> Generator[float, None, FollowedPath]:
+    embedding: Embedding, volume: Volume, targets: Sequence[Floats]
+) -> Generator[float, None, tuple[Volume, FollowedPath]]:
     """Follow the motion and meet the second key.
 
     Parameters
     ----------
     embedding : Embedding
-    mesh : TetMesh
-        A tetrahedral mesh of the cube, as fine as the surface.
-    landmarks : (n, N) sparse
-        Barycentric coordinates of the first key's vertices.
+    volume : Volume
+        Its tetrahedra are as fine as the surface.
     targets : sequence of (n, 3)
         Target positions of the vertices after each step, in cube units; the last is the second key.
 
@@ -53,29 +53,35 @@ def meet_keys(
     ------
     float
         The fraction that is done, in [0, 1].
+
+    Returns
+    -------
+    volume : Volume
+        With smaller tetrahedra where vertices could not be met otherwise.
+    followed : FollowedPath
     """
+    mesh, landmarks = volume.mesh, volume.landmarks
     crossing = crossing_vertices(embedding)
     base = _weights(embedding, crossing)
     fitter = StiffFitter(mesh, landmarks, _WEIGHT_ON_THE_WAY / LANDMARK_WEIGHT * base)
     followed = yield from told(follow_path(fitter, targets), lambda part: 0.6 * part)
     diagonal = embedding.pair.diagonal * embedding.scale
-    reachable = ~crossing
-    mapped, weights, before = followed.maps[-1], base, len(reachable)
-    schedule = [*_WEIGHTS, *[_WEIGHTS[-1]] * _MORE_ROUNDS]
-    for number, weight in enumerate(schedule):
+    aim = Aim(embedding.key0, embedding.key1, base, ~crossing, MET * diagonal, _STRONGEST_AT * diagonal)
+    mapped, weights = followed.maps[-1], base
+    for number, weight in enumerate(_WEIGHTS, start=1):
         fitter = fitter.with_weights(weight / LANDMARK_WEIGHT * weights)
         mapped = fitter.fit(mapped, embedding.key1, _ITERATIONS)
-        missed = np.linalg.norm(fitter.residuals(mapped, embedding.key1), axis=1) / diagonal
-        left = int(np.count_nonzero(missed[reachable] > MET))
-        if missed.max() <= 0.5 * MET:
+        missed = np.linalg.norm(fitter.residuals(mapped, embedding.key1), axis=1)
+        if number >= _AT_LEAST and np.count_nonzero((missed > aim.met) & aim.reachable) <= _FEW * len(missed):
             break
-        # More rounds only where many are left, and as long as they help.
-        if number >= len(_WEIGHTS) - 1 and (left <= _FEW * len(missed) or left > _PROGRESS * before):
-            break
-        before = left
-        weights = base * np.minimum(1.0, _STRONGEST_AT / np.maximum(missed, 1e-300))
-        yield 0.6 + 0.4 * min(1.0, (number + 1) / len(_WEIGHTS))
-    return followed.ending_with(mesh, mapped)
+        weights = aim.pull(missed)
+        yield 0.6 + 0.2 * number / len(_WEIGHTS)
+    maps = np.concatenate([followed.maps[:-1], mapped[None]])
+    finer, maps = yield from told(meet_rest(mesh, maps, aim), lambda part: 0.8 + 0.2 * part)
+    if finer is not mesh:
+        volume = replace(volume, mesh=finer)
+        maps[0] = finer.points
+    return volume, FollowedPath(maps, turns_along(finer, maps))
 
 
 def _weights(embedding: Embedding, crossing: Bools) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..collision.box_tree import CrowdedError
 from ..collision.crossings import crossing_pairs
+from ..collision.crossings_at_vertices import crossings_at_vertices
 from ..keys.embedding import Embedding
 from ..triangles.closed_volume import ClosedComponents
 from ..triangles.geometry import areas
@@ -25,8 +26,9 @@ _HALF = 0.5  # winding numbers of pieces are whole or half numbers
 def crossing_vertices(embedding: Embedding) -> Bools:
     """(n,) whether a vertex is where a key crosses itself; no fold-free map meets both keys there.
 
-    These are the vertices of triangles that cross in either key and their neighbors; pieces of a closed component that
-    are inside the component itself in either key; and pieces that are inside another closed component in one key only.
+    These are the vertices of triangles that cross in either key, also at a common vertex, and their neighbors; pieces
+    of a closed component that are inside the component itself in either key; and pieces that are inside another closed
+    component in one key only.
     True for all vertices if too many triangles overlap to be examined.
 
     Examples
@@ -45,7 +47,7 @@ def crossing_vertices(embedding: Embedding) -> Bools:
     found = np.zeros(len(embedding.key0), dtype=bool)
     for key in keys:
         try:
-            crossing = crossing_pairs(key, faces)
+            crossing = np.concatenate([crossing_pairs(key, faces), crossings_at_vertices(key, faces)])
         except CrowdedError:
             return np.ones(len(found), dtype=bool)
         found[faces[crossing.ravel()].ravel()] = True

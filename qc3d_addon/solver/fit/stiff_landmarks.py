@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..numerics.conjugate_gradients import conjugate_gradients
 from ..numerics.nested_dissection import elimination_order, factored
 from ..numerics.rotations import determinants
@@ -29,6 +29,7 @@ _TOLERANCE = 0.06
 _PRODUCTS = 5, 120  # smallest and largest number of iterations; fewer only solve the stiffest equations
 _MANY_PRODUCTS = 25  # if a solve needs more, the preconditioner is computed again
 _SETTLED = 3e-2  # relative to the energy above its minimum, the identity's 1
+_HOLDING = 1e6  # how much stiffer than others what is held counts in the preconditioner
 _HALVINGS = 9
 _LEAST_LENGTH = 1e-3  # shorter steps end the iteration
 _LEAST_LEFT = 0.25  # in one step, a determinant may shrink to this fraction
@@ -46,12 +47,21 @@ class StiffFitter(FoldFreeFitter):
     insideness : (M,), optional
         How far inside an object each tetrahedron is, from 0 to 1. Inside, weights are as the volumes then, so that an
         object that grows does so evenly; outside, they are all the same.
+    held : (N,) bool, optional
+        Vertices that do not move, beside what the cube's faces hold.
     """
 
     def __init__(
-        self, mesh: TetMesh, landmarks: csr_array, weights: Floats, insideness: Floats | None = None
+        self,
+        mesh: TetMesh,
+        landmarks: csr_array,
+        weights: Floats,
+        insideness: Floats | None = None,
+        held: Bools | None = None,
     ) -> None:
         super().__init__(mesh, landmarks, weights)
+        self._held = np.zeros(len(mesh.points), dtype=bool) if held is None else held
+        self._free &= ~self._held[:, None]
         inside = np.zeros(len(mesh.tets)) if insideness is None else insideness
         volumes = inside * mesh.volumes
         by_volume = volumes * (inside.sum() / max(float(volumes.sum()), np.finfo(np.float64).tiny))
@@ -88,7 +98,8 @@ class StiffFitter(FoldFreeFitter):
         matrix = self._pattern.assemble_blocks(element_blocks)
         if self._factors is None:
             scalar = self._pattern.assemble(np.trace(element_blocks, axis1=3, axis2=4) / 3.0)
-            scalar = csr_array(scalar + LANDMARK_WEIGHT * self._landmark_matrix)
+            holding = _HOLDING * float(scalar.diagonal().max()) * self._held
+            scalar = csr_array(scalar + LANDMARK_WEIGHT * self._landmark_matrix + diags_array(holding))
             self._factors = factored(csr_array(scalar[self._order][:, self._order]))
         factors = self._factors
         matrix.data += LANDMARK_WEIGHT * self._landmark_blocks

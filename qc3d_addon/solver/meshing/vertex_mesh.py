@@ -21,7 +21,9 @@ from .slivers import Effort, sliver_free
 
 _SHARE = 0.5  # spacing of samples at the surface, in local edge lengths; below 1 every vertex has a sample
 _MOST_FINER = 3.0  # where the surface is stretched, the spacing is divided by the root of its stretch, and at most this
-_WIDEST = 0.02  # spacing at the surface where edges are long, cube units
+# Spacing at the surface where edges are long, cube units: of surfaces with many vertices, and of those with few. With
+# no more tetrahedra than these have vertices, a map would have to bend from vertex to vertex to meet them all.
+_WIDEST, _MANY, _WIDEST_OF_FEW = 0.02, 4_000, 0.014
 _NEAREST = 6  # nearest vertices whose mean distance defines the local edge length
 # Much nearer vertices belong to another sheet, across a gap that has to be resolved. Factor on their distance.
 _GAP = 1.6
@@ -64,7 +66,7 @@ def vertex_mesh(points: Floats, faces: Ints, seed: int, moved: Floats | None = N
 
 
 def size_around(points: Floats, stretches: Floats) -> SizeField:
-    """The spacing of samples around vertices (n, 3) with stretches (n,), at the surface at most 0.02."""
+    """The spacing of samples around vertices (n, 3) with stretches (n,); at the surface at most 0.02, 0.014 for few."""
     normal = RESOLUTIONS["normal"]
     places, place = np.unique(points, axis=0, return_inverse=True)
     tree = cKDTree(places)
@@ -76,14 +78,15 @@ def size_around(points: Floats, stretches: Floats) -> SizeField:
     np.maximum.at(finer, place.ravel(), np.sqrt(np.clip(stretches, 1.0, _MOST_FINER**2)))
     beside = distances[:, 1:]
     local = _SHARE / finer * np.minimum(beside.mean(axis=1), _GAP * beside[:, 0])
+    widest = min(_WIDEST, max(_WIDEST_OF_FEW, _WIDEST * (len(places) / _MANY) ** (1.0 / 3.0)))
     for _ in range(_NEAREST):
         local = np.minimum(local, (local[neighbors] + _SLOPE * distances).min(axis=1))
 
     def size(positions: Floats) -> Floats:
         far, nearest = (np.asarray(found) for found in tree.query(positions, k=min(4, len(places))))
         graded = (local[nearest] + _SLOPE * far).min(axis=1)
-        coarsest = np.minimum(_WIDEST + normal.slope * far[:, 0], normal.largest)
-        return np.minimum(graded, coarsest, dtype=np.float64)
+        coarsest = np.minimum(widest + normal.slope * far[:, 0], normal.largest)
+        return np.asarray(np.minimum(graded, coarsest), dtype=np.float64)
 
     return size
 

@@ -10,7 +10,7 @@ import pytest
 from qc3d_addon.solver import api
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.errors import InputError
-from qc3d_addon.solver.fit import meeting
+from qc3d_addon.solver.fit import local_meeting, meeting
 from qc3d_addon.solver.fit.fit_pair import fit_pair
 from qc3d_addon.solver.fit.fitted_map import FittedMap
 from qc3d_addon.solver.fit.meeting import MET
@@ -106,6 +106,7 @@ def test_by_the_api() -> None:
 
 def test_vertices_that_cannot_be_met_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meeting, "_ITERATIONS", 2)
+    monkeypatch.setattr(local_meeting, "_FIRST_PULLS", ((1e9, 2),))
     points, faces = icosphere(1, 1.0)
     middle = points.mean(axis=0)
     pushed = points.copy()

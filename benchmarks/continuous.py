@@ -106,7 +106,7 @@ def row(pair: Pair, parts: int) -> list[str]:
 
 def _divided(knots: Floats, parts: int) -> Floats:
     """Positions (k,) with so many parts between every two of these (q,)."""
-    return np.unique(np.concatenate([*np.linspace(knots[:-1], knots[1:], parts + 1), knots]))
+    return np.asarray(np.unique(np.concatenate([*np.linspace(knots[:-1], knots[1:], parts + 1), knots])))
 
 
 def baked(pair: Pair, faces: Ints, first: Floats, second: Floats) -> tuple[Floats, Floats]:

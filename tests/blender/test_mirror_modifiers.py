@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from qc3d_addon.blender.bake.seams import opened_seams
 from qc3d_addon.blender.store.mesh_data import read_pairs
 from qc3d_addon.blender.store.mirror_modifiers import mirror_planes
 from qc3d_addon.solver.errors import InputError
@@ -121,6 +122,19 @@ def test_vertices_near_the_plane_stay_as_near(shown: Shown) -> None:
     assert whole < 2 * len(obj.data.vertices)
     bake()
     assert {len(shown(obj, **{SLIDER: place})) for place in PLACES} == {whole}
+
+
+def test_a_key_that_opens_the_seam_is_named(shown: Shown) -> None:
+    obj = half("X")
+    mirrored(obj)
+    assert not opened_seams(read_pairs(obj, ("Basis", "Sway")))
+    points = obj.data.shape_keys.key_blocks["Sway"].points
+    seam = [number for number, vertex in enumerate(obj.data.vertices) if vertex.co.x == 0.0]
+    for number in seam[:3]:
+        points[number].co.x += 0.1
+    bake()
+    [said] = [note for note in _notes(obj) if "opens" in note]
+    assert said.startswith("3 vertices of the seam are on the mirror plane in 'Basis' but not in 'Sway', where")
 
 
 def test_what_mirrors_nothing_is_left_out() -> None:

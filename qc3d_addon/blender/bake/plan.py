@@ -28,6 +28,7 @@ from ..store.renames import digest
 from ..store.summaries import Summary
 from . import bookkeeping, colliders
 from .request import BakeRequest, BakeResult
+from .seams import opened_seams
 from .suggested_keys import made_keys
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def plan_bake(obj: bpy.types.Object | None, request: BakeRequest) -> Plan:
     if (play.tolerance > 0.0 or play.more) and same.items() <= chain.request.items():
         # With the same aim, a re-bake keeps all steps, so that their keys can stay.
         play = replace(play, also_at=(*play.also_at, *chain.places[1:-1]))
-    usable, notes = {}, []
+    usable, notes = {}, opened_seams(pairs)
     for ends, pair in pairs.items():
         data = record.kept_map(keys, kept_map(ends, pair, request.fit_options))
         problem = None if data is None else why_unusable(data)

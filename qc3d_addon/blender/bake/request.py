@@ -186,9 +186,8 @@ class BakeResult:
 def _require_frames(frames: tuple[int, ...], keys: int) -> None:
     """Raise InputError unless there are two frames or one for each key, in increasing order."""
     if len(frames) not in (2, keys):
-        raise InputError(
-            f"{len(frames)} frames are given for {keys} keys; give the first and the last, or one for each key."
-        )
+        given = "1 frame is" if len(frames) == 1 else f"{len(frames)} frames are"
+        raise InputError(f"{given} given for {keys} keys; give the first and the last, or one for each key.")
     for frame, following in pairwise(frames):
         if frame >= following:
             raise InputError(

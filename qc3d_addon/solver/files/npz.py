@@ -223,7 +223,9 @@ def require_file(path: Path, most: int = MOST_BYTES) -> None:
 
 def unreadable(what: Path | str, error: BaseException) -> InputError:
     """The error to raise when reading fails, with a remedy."""
-    remedy = remedy_of_limit(error) or "export it again, or name another file"
+    is_missing = isinstance(error, (FileNotFoundError, NotADirectoryError))
+    remedy = "name a file that exists" if is_missing else "export it again, or name another file"
+    remedy = remedy_of_limit(error) or remedy
     return InputError(f"{what} cannot be read: {reason(error)}; {remedy}.")
 
 

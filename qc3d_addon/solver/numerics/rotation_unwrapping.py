@@ -31,6 +31,8 @@ _HALF_TURN = np.radians(30.0)
 # Relative rotations of a loose part and the surface beside it, up to which the part is taken to be fixed there, like a
 # button on a sleeve. Two wings beat in opposite directions: neither tells anything about the other.
 _ALIKE = np.radians(60.0)
+# Of several parts that are as large as the largest but for this, the first counts as that: rounding must not choose.
+_AS_LARGE = 1e-3
 _MEAN_STEPS = 30  # a cap: rotations that are spread all around may have no unique mean
 _MEAN_FOUND = 1e-13  # radians; about the rounding of rotation vectors
 
@@ -216,7 +218,8 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
 
 def _agreeing_parts(forest: RotationForest, vectors: Floats, centers: Floats, weights: Floats, loose: Bools) -> Floats:
     """Rotation vectors (m, 3) with every loose part that turns like the largest part beside it on the same branch."""
-    largest = forest.labels == np.argmax(sums_by_label(forest.labels, weights))
+    sizes = sums_by_label(forest.labels, weights)
+    largest = forest.labels == np.argmax(sizes >= (1.0 - _AS_LARGE) * sizes.max())
     others = forest.roots[~largest[forest.roots] & loose[forest.roots]]
     if not len(others):
         return vectors

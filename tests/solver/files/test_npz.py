@@ -86,6 +86,11 @@ def test_a_link_to_a_whole_file_is_read(tmp_path: Path) -> None:
     read_shapes(tmp_path / "link.npz")
 
 
+def test_a_file_that_is_missing_cannot_be_exported_again(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.npz cannot be read: .*; name a file that exists"):
+        read_shapes(tmp_path / "none.npz")
+
+
 @pytest.mark.parametrize("shape", [(2**40, 3), (2**62, 2**62), (10**9, 3), (1, 3)])
 def test_sizes_are_compared_before_anything_is_allocated(shape: tuple[int, ...], tmp_path: Path) -> None:
     header = io.BytesIO()

@@ -71,6 +71,15 @@ class TestKnownTurns:
         button = np.broadcast_to(np.radians(228.0) * np.array([0.0, 1.0, 0.0]), (2, 3))
         assert_recovered(np.concatenate([sleeve, button]), np.concatenate([chain(12), [[12, 13]]]))
 
+    def test_rounding_does_not_choose_the_largest_of_parts_of_one_size(self) -> None:
+        """Pieces that are all alike, such as leaves, and that turn by nearly half a turn one way or the other."""
+        angles = np.radians([170.0, 170.0, -170.0, -170.0])
+        turns, edges = angles[:, None] * np.array([0.0, 0.0, 1.0]), np.array([[0, 1], [2, 3]])
+        centers, loose = np.zeros((4, 3)), np.zeros(4, dtype=bool)
+        sizes = [np.array([1.0, 1.0, 1.0 + less, 1.0]) for less in (-1e-15, 0.0, 1e-15)]
+        ways = [consistent_turning(turns, edges, centers, size, loose).swing for size in sizes]
+        np.testing.assert_allclose(ways, np.broadcast_to(ways[0], (3, 4, 3)), rtol=0.0, atol=1e-12)
+
     def test_wings_beat_each_its_own_way(self) -> None:
         # From the tip to the body, where the other one begins.
         wing = np.radians(np.linspace(185.0, 125.0, 8))[:, None] * np.array([0.0, 0.0, 1.0])

@@ -3,9 +3,9 @@
 """Bytes of maps and frames at equal error, by QC3D and by other ways, as Markdown tables.
 
     pip install "qc3d[benchmark]"
-    python -m benchmarks.compression --data FOLDER [--errors 1e-3] [--only maps|frames]
+    python -m benchmarks.compression --data FOLDER [--errors 1e-3] [--only maps|frames] [--write]
 
-FOLDER contains head.npz, body.npz and horse.npz.
+FOLDER contains head.npz, body.npz and horse.npz. ``--write`` puts all tables into docs/reference/compression.md.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
+from benchmarks.catalogue import ROOT
+from benchmarks.report import write_between_markers
 from benchmarks.rivals import Rivals
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.compression.codec import Codec
@@ -37,6 +39,7 @@ from qc3d_addon.solver.support.progress import finish
 from qc3d_addon.solver.tets.mesh import TetMesh
 from qc3d_paper.experiments import shapes
 
+DOCUMENT = ROOT / "docs/reference/compression.md"
 ERRORS = (1e-2, 3e-3, 1e-3, 1e-4, 1e-5)
 COUNTS = (16, 60)  # of modes
 HORSE = shapes.Pose("horse.npz", "", "bind", "Gallop_0", "y")
@@ -51,22 +54,42 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, metavar="FOLDER")
     parser.add_argument("--errors", type=float, nargs="+", default=ERRORS, metavar="E")
-    parser.add_argument("--only", choices=("maps", "frames"))
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument("--only", choices=("maps", "frames"))
+    chosen.add_argument("--write", action="store_true", help=f"write the tables of {DOCUMENT.name}")
     arguments = parser.parse_args()
-    wanted = arguments.errors
+    wanted, page = arguments.errors, Page([])
     for pose in MAPS if arguments.only != "frames" else ():
         fitted = shapes.fitted(shapes.read(pose, arguments.data))
         mesh, targets = fitted.mesh, fitted.mapped[None]
         ways: dict[str, OfError] = {"**QC3D**": partial(_small_map, mesh, targets)}
-        _print(f"map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways, wanted)
-        _print_named(mesh, targets)
+        _compare(page, f"Map {pose.label}, {len(mesh.points)} vertices", mesh.points, targets, ways, wanted)
+        _compare_named(page, mesh, targets)
     for through, between in CHAINS if arguments.only != "maps" else ():
         frames, faces, settings, polygons = _baked(arguments.data / "body.npz", through, between)
         ways = {
             "**QC3D**": partial(_small_bake, frames, faces, settings, polygons),
             "QC3D, scheme stored": partial(_small_frames, frames, faces),
         }
-        _print(f"{len(frames) - 1} frames, {' → '.join(through)}", frames[0], frames[1:], ways, wanted)
+        label = f"{len(frames) - 1} frames of a body of {len(frames[0])} vertices, {' → '.join(through)}"
+        _compare(page, label, frames[0], frames[1:], ways, wanted)
+    if arguments.write:
+        write_between_markers(DOCUMENT, "\n".join(page.lines).strip(), "benchmarks/compression.py")
+
+
+class Page(NamedTuple):
+    """The lines that were printed."""
+
+    lines: list[str]
+
+    def say(self, line: str = "") -> None:
+        """Print a line and keep it."""
+        print(line, flush=True)
+        self.lines.append(line)
+
+    def row(self, name: str, cells: Sequence[str]) -> None:
+        """Print a row of a table and keep it."""
+        self.say("| " + " | ".join([name, *cells]) + " |")
 
 
 def _small_map(mesh: TetMesh, targets: Floats, error: float) -> Small:
@@ -92,15 +115,17 @@ def _baked(path: Path, through: Sequence[str], between: int) -> tuple[Floats, In
     return bake.frames, pair.faces, settings, pair.polygons
 
 
-def _print(label: str, points: Floats, targets: Floats, ways: dict[str, OfError], wanted: Sequence[float]) -> None:
+def _compare(
+    page: Page, label: str, points: Floats, targets: Floats, ways: dict[str, OfError], wanted: Sequence[float]
+) -> None:
     unit = diagonal_of(points)
     moved = targets - points
     rivals = Rivals(points, moved, unit)
     still = float(np.sqrt((moved**2).sum(axis=2).mean(axis=1).max())) / unit
     errors = [error for error in wanted if error < still]  # above it nothing need be stored
-    print(f"\n{label} ({4 * moved.size} bytes raw; {still:.1e} without anything)\n")
-    print("| bytes | " + " | ".join(f"{error:.0e}" for error in errors) + " |")
-    print("|---" * (len(errors) + 1) + "|", flush=True)
+    page.say(f"\n**{label}** ({4 * moved.size:,} bytes raw; {still:.1e} without anything)\n")
+    page.row("bytes", [f"{error:.0e}" for error in errors])
+    page.say("|---" * (len(errors) + 1) + "|")
     notes: dict[str, list[str]] = {}
     for name, way in ways.items():
         cells = []
@@ -110,18 +135,19 @@ def _print(label: str, points: Floats, targets: Floats, ways: dict[str, OfError]
             cells.append(f"**{len(small.data)}**" if name.startswith("**") else str(len(small.data)))
             folds = f", {sum(small.folds)} folds" if small.folds else ""
             notes.setdefault(name, []).append(f"{small.way}, {time.process_time() - start:.1f} s{folds}")
-        _print_row(name, cells)
+        page.row(name, cells)
     others = [rivals.sizes(error) for error in errors]
     for name in others[0]:
-        _print_row(name, ["not installed" if sizes[name] is None else str(sizes[name]) for sizes in others])
+        page.row(name, ["not installed" if sizes[name] is None else str(sizes[name]) for sizes in others])
     for name, cells in notes.items():
-        _print_row(f"how, and seconds of one core: {name.strip('*')}", cells)
+        page.row(f"how, and seconds of one core: {name.strip('*')}", cells)
 
 
-def _print_named(mesh: TetMesh, targets: Floats) -> None:
+def _compare_named(page: Page, mesh: TetMesh, targets: Floats) -> None:
     """Modes alone by the schemes that have names, and what the smallest way needs for the same error."""
-    print("\n| scheme, modes | error | bytes | folds | seconds | QC3D at that error | folds |")
-    print("|---|---|---|---|---|---|---|", flush=True)
+    page.say()
+    page.row("scheme, modes", ["error", "bytes", "folds", "seconds", "QC3D at that error", "folds"])
+    page.say("|---" * 7 + "|")
     packer = Packer(Source("maps", mesh.points, mesh.tets), max(COUNTS))
     for scheme in get_args(Scheme):
         compressor = Compressor(Codec(mesh, max(COUNTS), scheme), targets, packer)
@@ -130,16 +156,12 @@ def _print_named(mesh: TetMesh, targets: Floats) -> None:
             try:
                 choice = compressor.with_modes(count)
             except ReconstructionError:
-                _print_row(f"{scheme}, {count}", ["no map"] * 6)
+                page.row(f"{scheme}, {count}", ["no map"] * 6)
                 continue
             seconds = time.process_time() - start
             small = _small_map(mesh, targets, choice.error)
             cells = [choice.size, sum(choice.folds), f"{seconds:.0f}", len(small.data), sum(small.folds)]
-            _print_row(f"{scheme}, {count}", [f"{choice.error:.1e}", *map(str, cells)])
-
-
-def _print_row(name: str, cells: Sequence[str]) -> None:
-    print("| " + " | ".join([name, *cells]) + " |", flush=True)
+            page.row(f"{scheme}, {count}", [f"{choice.error:.1e}", *map(str, cells)])
 
 
 if __name__ == "__main__":

@@ -147,6 +147,13 @@ ENTRIES = (
         needs="shapes",
     ),
     Entry("clips", (_module("clips"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
+    Entry(
+        "chain picture",
+        (_module("chain_picture", f"{IMAGES}/chain.png"),),
+        "seconds",
+        {f"{IMAGES}/chain.png": ""},
+        needs="shapes",
+    ),
     Entry("played", (_module("played"),), "minutes", printed=(f"{SCIENCE}/inbetweens.md",), needs="shapes"),
     Entry(
         "continuous",
@@ -186,9 +193,9 @@ ENTRIES = (
     Entry("large", (_module("large"),), "an hour", printed=(f"{GUIDE}/limits.md",)),
     Entry(
         "compression",
-        (_module("compression", "--data", "{data}"),),
-        "an hour",
-        printed=("docs/reference/compression.md",),
+        (_module("compression", "--data", "{data}", "--write"),),
+        "minutes",
+        tables=(("docs/reference/compression.md", "benchmarks/compression.py"),),
         needs="shapes",
     ),
 )  # fmt: skip

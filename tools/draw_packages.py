@@ -66,7 +66,7 @@ def draw(path: Path) -> None:
     for level, rooms in enumerate(floors):
         for number, room in enumerate(rooms):
             places[room] = (2.6 * (number - 0.5 * (len(rooms) - 1)), 1.15 * level)
-    figure, axes = pyplot.subplots(figsize=(9, 12))
+    figure, axes = pyplot.subplots(figsize=(9, 1.1 * len(floors)))
     heights = {room: level for level, rooms in enumerate(floors) for room in rooms}
     for (own, other), count in arrows.items():
         (x0, y0), (x1, y1) = places[own], places[other]
@@ -94,7 +94,7 @@ def draw(path: Path) -> None:
             count = sizes[room]
             text = room if count == 1 else f"{room}\n{count} modules"
             ink = "white" if color in _DARK else "black"
-            axes.text(x, y, text, ha="center", va="center", fontsize=11, zorder=4, color=ink)
+            axes.text(x, y, text, ha="center", va="center", fontsize=10.5, zorder=4, color=ink)
     axes.axhline(1.15 * (len(SOLVER_FLOORS) - 0.5), color="black", linewidth=1.0, linestyle=":")
     note = "solver/: numpy and scipy only.\nArrays, errors and settings\nare imported from everywhere."
     axes.text(-4.4, 1.15 * (len(SOLVER_FLOORS) - 0.5) - 0.12, note, va="top", fontsize=10)

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -39,6 +41,16 @@ def test_translations_keep_names_and_the_form_of_labels(language: str) -> None:
         for name in KEPT.findall(text):
             assert name in translation, text
         assert text.startswith("  ") == translation.startswith("  ")
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_what_fits_on_a_button_in_english_fits_on_it(language: str) -> None:
+    # Pixels of Blender's own font at its usual size; the sidebar is 240 wide or wider, without the margins of a panel.
+    blf: Any = importlib.import_module("blf")  # Blender's own: it is there once bpy is
+    blf.size(0, 11)
+    for text, translation in LANGUAGES[language].items():
+        if blf.dimensions(0, text)[0] <= 130:
+            assert blf.dimensions(0, translation)[0] <= 205, (text, translation)
 
 
 def test_blender_gets_them_as_labels_of_operators_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,15 +186,17 @@ class TriangleTree:
 
 
 def _concerned(pairs: Pairs, moves: Bools) -> Pairs:
-    concerned = moves[pairs[0]] | moves[pairs[1]]
-    return pairs[0][concerned], pairs[1][concerned]
+    concerned = np.flatnonzero(moves.take(pairs[0]) | moves.take(pairs[1]))
+    return pairs[0].take(concerned), pairs[1].take(concerned)
 
 
 def _meeting(pairs: Pairs, low: Floats, high: Floats) -> Pairs:
     first, second = pairs
-    for axis in range(3):
-        met = (low[axis][first] <= high[axis][second]) & (low[axis][second] <= high[axis][first])
-        first, second = first[met], second[met]
+    for lowest, highest in zip(low, high, strict=True):
+        met = lowest.take(first) <= highest.take(second)
+        met &= lowest.take(second) <= highest.take(first)
+        near = np.flatnonzero(met)
+        first, second = first.take(near), second.take(near)
     return first, second
 
 

@@ -95,7 +95,7 @@ class CrossingSearch:
         """
         if self._tree is None:
             return np.empty((0, 2), dtype=np.int64)
-        corners = np.stack([coordinate[self._corners] for coordinate in np.ascontiguousarray(points.T)])
+        corners = np.stack([coordinate.take(self._corners) for coordinate in np.ascontiguousarray(points.T)])
         one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
         low, high = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
         depth = TOUCHING * float((high.max(axis=1) - low.min(axis=1)).max())
@@ -109,7 +109,7 @@ class CrossingSearch:
             apart = ~_share_a_vertex(self._faces[first], self._faces[second])
             first, second = first[apart], second[apart]
             budget.spend(_WORK_OF_A_TEST * len(first))
-            crossing = _cross(corners[:, :, first], corners[:, :, second], depth)
+            crossing = _cross(corners.take(first, axis=2), corners.take(second, axis=2), depth)
             found = np.sort(self._rows[np.stack([first[crossing], second[crossing]])], axis=0)
             codes.append(found[0] * self._count + found[1])
         ordered = np.sort(np.concatenate(codes))

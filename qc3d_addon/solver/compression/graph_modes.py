@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from ..arrays import Bools, Floats, Ints
@@ -56,18 +56,26 @@ def graph_modes(matrix: csc_array, free: Bools, count: int, *, is_surface: bool)
         vectors = _lowest(inner, count, start)
     else:
         vectors = _interpolated(inner, count)
-    modes = np.zeros((len(free), count))
+    modes = np.zeros((len(free), vectors.shape[1]))
     modes[rows] = vectors * np.where(start @ vectors < 0.0, -1.0, 1.0)
     return modes
 
 
 def _interpolated(matrix: csc_array, count: int) -> Floats:
-    """(n, k) the lowest modes among the functions that multigrid interpolates from a thirtieth of the vertices."""
+    """(n, k) the lowest modes among the functions that multigrid interpolates from a thirtieth of the vertices.
+
+    They are fewer than ``count`` where vertices with very many neighbors leave multigrid with hardly any.
+    """
     random = np.random.default_rng(_SEED)
     interpolation = Multigrid(csr_array(matrix), np.ones(matrix.shape[0]), random).interpolation
-    assert interpolation is not None
-    coarse, mass = (csc_array(interpolation.T @ (one @ interpolation)) for one in (matrix, eye_array(matrix.shape[0])))
-    return np.asarray(interpolation @ _lowest(coarse, count, random.normal(size=coarse.shape[0]), mass))
+    few = 0 if interpolation is None else interpolation.shape[1]
+    count = min(count, few // 2)
+    if interpolation is None or not count:
+        return np.zeros((matrix.shape[0], 0))
+    coarse, mass = csc_array(interpolation.T @ (matrix @ interpolation)), csc_array(interpolation.T @ interpolation)
+    if few <= _DENSE:
+        return np.asarray(interpolation @ eigh(coarse.toarray(), mass.toarray(), subset_by_index=(0, count - 1))[1])
+    return np.asarray(interpolation @ _lowest(coarse, count, random.normal(size=few), mass))
 
 
 def _lowest(matrix: csc_array, count: int, start: Floats, mass: csc_array | None = None) -> Floats:

@@ -22,8 +22,7 @@ _MOST_BITS = 24
 # Smaller differences than this many steps are told as 0; which pays best depends on the field.
 _THRESHOLDS = (0.6, 0.5, 0.66)
 _COUNTS_OF_MODES = (30, 60, MOST_MODES)
-# Each time there are twice as many modes, they leave no less of the error than this power of what they left last time.
-_HOPEFUL = 2.0
+_HOPE = 0.5  # of the error is the least that twice as many modes are expected to leave
 _ROOMY = 0.9  # of the error is left by modes: where it is less, twice as many take more bytes than larger steps save
 _TRIALS = 14
 _NEAR = 0.995  # of the error is near enough
@@ -179,10 +178,8 @@ def _with_modes(wanted: Wanted, rows: Rows) -> Iterator[Candidate]:
     counts = list(dict.fromkeys(min(count, space.most_modes) for count in _COUNTS_OF_MODES))
     for number, count in enumerate(counts, start=1):
         coefficients = analyzed(space, rows.rows, count)
-        halves = (coefficients, coefficients[:, : count // 2])
-        excess, before = (wanted.excess(rows.displacements(synthesized(space, some))) for some in halves)
-        hope = (excess / max(before, 1e-300)) ** (_HOPEFUL * (len(counts) - number))
-        if not count or excess * hope >= _MARGIN:
+        excess = wanted.excess(rows.displacements(synthesized(space, coefficients)))
+        if not count or excess * _HOPE ** (len(counts) - number) >= _MARGIN:
             return
         if excess >= _MARGIN:
             continue  # there is hope

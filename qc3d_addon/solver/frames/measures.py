@@ -15,6 +15,7 @@ from ..fit.fitted_map import FittedMap
 from ..keys.keypair import KeyPair
 from ..maps.distortion import TriangleStretches, approximate_singular_values, dilatation, extreme_stretch, volume_ratio
 from ..support.threads import in_threads
+from ..triangles.geometry import edge_lengths
 from .report import WorstStretch
 
 _MOST = 1e6  # larger ratios only say that something is flat
@@ -161,8 +162,7 @@ class EdgeExcess:
         return np.asarray(np.maximum(length / self._longest - 1.0, 1.0 - length / self._shortest))
 
     def _lengths(self, shape: Floats) -> Floats:
-        spans = (shape[self.edges[:, 0]] - shape[self.edges[:, 1]]) / self._unit
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", spans, spans)))
+        return edge_lengths(shape / self._unit, self.edges)
 
 
 def worst_excess(pair: KeyPair, frames: Floats) -> WorstStretch:

@@ -8,6 +8,9 @@ Anderson mixing do not have that property: in-betweens computed with them jump f
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
+
 from ..arrays import Floats
 
 # The first steps are not accelerated: until the fast-decaying errors are gone, the iteration is far from linear (Wang
@@ -38,6 +41,12 @@ class ChebyshevIteration:
         self._steps = 0
         self._weight = 1.0
         self._before: Floats | None = None
+
+    def of(self, columns: Sequence[int] | slice) -> ChebyshevIteration:
+        """An iteration that goes on from here by itself, for some entries of the second axis of all points."""
+        other = copy.copy(self)
+        other._before = None if self._before is None else self._before[:, columns]
+        return other
 
     def next(self, point: Floats, mapped: Floats) -> Floats:
         """The next point, given the present ``point`` and what the plain iteration maps it to; any array shape."""

@@ -253,9 +253,11 @@ class SurfacePath:
         settled = work.settled(sweeps)
         onsets = onset_of_mixing(work.corrected)
         costly = np.flatnonzero(onsets > 0.0).tolist()
+        begun = work.branch.of(costly) if work.branch is not None and costly else None
         del work  # the second sweeps must not need its memory in addition
         if costly:
-            free = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False).settled(sweeps)
+            apart = Sweeps(self._surface, [wanted[shape] for shape in costly], holds_volumes=False)
+            free = apart.settled(sweeps, begun)
             for shape, other in zip(costly, free, strict=True):
                 mixed = self._lengths_first.mixed(settled[shape], other, moments[shape][0])
                 settled[shape] = settled[shape] + onsets[shape] * (mixed - settled[shape])

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..numerics.chebyshev import ChebyshevIteration
 from .pieces import TRIANGLES_IN_CACHE, Operator
 from .system import MovingSurface
@@ -60,6 +60,32 @@ class Wanted:
     volumes: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Where the sweeps of q shapes were when volumes were first looked at; before, it does not matter whether they are.
+
+    Parameters
+    ----------
+    sweep : int
+        The next one.
+    moved : (3, q, k)
+        Positions of the moving vertices.
+    iteration : ChebyshevIteration
+    going : (q,) bool
+        Which shapes have not converged.
+    """
+
+    sweep: int
+    moved: Floats
+    iteration: ChebyshevIteration
+    going: Bools
+
+    def of(self, shapes: Sequence[int]) -> Branch:
+        """The same for some of the shapes."""
+        chosen = list(shapes)
+        return Branch(self.sweep, self.moved[:, chosen], self.iteration.of(chosen), self.going[chosen])
+
+
 class Sweeps:
     """The sweeps of q shapes at once; the result of each shape does not depend on the others.
 
@@ -76,12 +102,15 @@ class Sweeps:
     ----------
     corrected : (q,)
         For each shape the largest part of a wanted volume that is missing half-way, before volumes are looked at.
+    branch : Branch, optional
+        Where the sweeps were then.
     """
 
     def __init__(self, surface: MovingSurface, wanted: Sequence[Wanted], holds_volumes: bool = True) -> None:
         self._surface = surface
         self._holds_volumes = holds_volumes and not surface.volumes.empty
         self.corrected = np.zeros(len(wanted))
+        self.branch: Branch | None = None
         self._wanted = wanted
         self._moving = slice(0, len(surface.moving))
         # The moving vertices first, then the still ones next to them.
@@ -93,22 +122,28 @@ class Sweeps:
         self._volume_direction: Floats | None = None
         self._found: list[tuple[Floats, Floats]] | None = None
 
-    def settled(self, sweeps: int) -> list[Floats]:
-        """(n, 3) positions of each shape, cube units, after the given number of sweeps."""
+    def settled(self, sweeps: int, begun: Branch | None = None) -> list[Floats]:
+        """(n, 3) positions of each shape, cube units, after the given number of sweeps, of which some may be begun."""
         settled = [shape.start.copy() for shape in self._wanted]
         if len(self._surface.moving):
-            self._sweep(sweeps)
+            self._sweep(sweeps, begun)
             for positions, moved in zip(settled, self._moved.transpose(1, 2, 0), strict=True):
                 positions[self._surface.moving] = moved
         return settled
 
-    def _sweep(self, sweeps: int) -> None:
-        iteration = ChebyshevIteration(_RADIUS, _RELAXATION)
-        going = np.ones(len(self._wanted), dtype=bool)
+    def _sweep(self, sweeps: int, begun: Branch | None) -> None:
         # Volumes are restored in the second half only: doing it earlier improves no measure.
         first_with_volumes = sweeps // 2 + 1 if self._holds_volumes else 0
-        self._move(self._corrected(True))
-        for sweep in range(1, sweeps):
+        if begun is None:
+            first, iteration = 1, ChebyshevIteration(_RADIUS, _RELAXATION)
+            going = np.ones(len(self._wanted), dtype=bool)
+            self._move(self._corrected(True))
+        else:
+            first, iteration, going = begun.sweep, begun.iteration, begun.going.copy()
+            self._move(begun.moved)
+        for sweep in range(first, sweeps):
+            if self._holds_volumes and sweep == first_with_volumes:
+                self.branch = Branch(sweep, self._moved.copy(), iteration.of(slice(None)), going.copy())
             present, refitted = self._moved.copy(), self._refitted()
             if self._holds_volumes and sweep >= first_with_volumes:
                 # What had converged before has not, if its volume is another one.

@@ -84,6 +84,11 @@ class TestModes:
             missed.append(np.linalg.norm(rest) / np.linalg.norm(field))
         assert missed[0] <= missed[1] < 1.2 * missed[0] < 0.5
 
+    def test_a_large_volume_around_one_vertex_has_few(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(graph_modes_module, "FACTORED_IN_VOLUME", 0)
+        hub = np.stack([np.zeros(700, dtype=np.int64), np.arange(1, 701)], axis=1)
+        assert graph_modes(laplacian(hub, 701), np.ones(701, dtype=bool), 8, is_surface=False).shape[1] < 8
+
     def test_two_equal_parts_have_modes_of_their_own(self) -> None:
         points, faces = icosphere(2)
         both = np.concatenate([faces, faces + len(points)])

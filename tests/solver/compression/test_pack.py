@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats
+from qc3d_addon.solver.compression import graph_modes
 from qc3d_addon.solver.compression.compact import from_bytes
 from qc3d_addon.solver.compression.files import Source
 from qc3d_addon.solver.compression.pack import (
@@ -139,6 +140,15 @@ class TestMaps:
         assert len(small.data) < 0.6 * morton_and_lzma(
             mesh.points, sine_map(mesh.points, AMPLITUDES, WAVES)[None] - mesh.points, 3e-3
         )
+
+    @pytest.mark.parametrize("factored", [10**6, 0])
+    def test_modes_come_back_however_they_are_found(self, monkeypatch: pytest.MonkeyPatch, factored: int) -> None:
+        monkeypatch.setattr(graph_modes, "FACTORED_IN_VOLUME", factored)
+        mesh = jittered_grid(11, seed=1)
+        small = maps(1e-2, "auto", mesh, sine_map(mesh.points, AMPLITUDES, WAVES)[None])
+        assert small.way == "modes"
+        assert small.error <= 1e-2
+        np.testing.assert_array_equal(unpacked(small.data, Source("maps", mesh.points, mesh.tets)), small.restored)
 
     def test_nothing_to_tell(self) -> None:
         small = maps(1e-3, "auto", MESH, MESH.points[None])

@@ -225,3 +225,21 @@ def test_vertices_in_a_line_do_not_keep_the_path_from_its_keys(turn: list[float]
     embedding, path = path_of(points, key1.astype(np.float32).astype(np.float64), np.concatenate([FACES, slivers]))
     for time, key in ((1e-6, embedding.key0), (1.0 - 1e-6, embedding.key1)):
         assert np.abs(path.positions(time) - key).max() < 1e-5
+
+
+@pytest.mark.parametrize("chosen", [[0, 1, 2], [2], [1, 0]])
+@pytest.mark.parametrize("name", ["bend", "growing", "equal", "two parts", "no faces"])
+def test_sweeps_without_volumes_go_on_from_where_those_with_volumes_look_at_them(name: str, chosen: list[int]) -> None:
+    path = path_of(*PAIRS[name])[1]
+    wanted = [path._wanted(time, None) for time in (0.2, 0.5, 0.7)]
+    first = sweeps.Sweeps(path._surface, wanted)
+    first.settled(13)
+    few = [wanted[shape] for shape in chosen]
+    whole = sweeps.Sweeps(path._surface, few, holds_volumes=False).settled(13)
+    if first.branch is None:  # nothing is closed, or nothing moves
+        assert name in ("equal", "no faces")
+        return
+    for _ in range(2):  # what was begun can be used again
+        begun = first.branch.of(chosen)
+        again = sweeps.Sweeps(path._surface, few, holds_volumes=False).settled(13, begun)
+        np.testing.assert_array_equal(again, whole)

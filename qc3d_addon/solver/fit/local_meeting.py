@@ -31,6 +31,7 @@ _FIRST_PULLS = ((1e9, 12), (1e10, 12))  # in the round in which tetrahedra are a
 _ROUNDS = 6  # each but the first with smaller tetrahedra
 _BISECTIONS = 6  # in each round; three of them halve all lengths
 _MOST = 3.0  # tetrahedra in the end, relative to those at the beginning: beyond that, what is left stays missed
+_PROGRESS = 0.9  # a round that leaves more than this of what was missed is the last
 _RINGS, _MORE_RINGS = 2, 3  # of tetrahedra: those that are halved, and those around them that may move
 
 
@@ -87,12 +88,14 @@ def meet_rest(mesh: TetMesh, maps: Floats, aim: Aim) -> Generator[float, None, t
     """
     owners, weights = locate(mesh, aim.sources)
     missed = np.linalg.norm(_at(mesh, owners, weights, maps[-1]) - aim.targets, axis=1)
-    most = _MOST * len(mesh.tets)
+    most, before = _MOST * len(mesh.tets), np.inf
     for number in range(_ROUNDS):
         locked = (missed > aim.met) & aim.reachable
         tried = locked if number else missed > aim.met
-        if not tried.any() or len(mesh.tets) > most:
+        left = float(missed[locked].sum())
+        if not tried.any() or len(mesh.tets) > most or left > _PROGRESS * before:
             break
+        before = left if number else np.inf
         region = _around(mesh, owners[tried], _RINGS + _MORE_RINGS)
         part = _Part(region, np.unique(mesh.tets[region]), np.flatnonzero(region[owners]))
         halved = _around(mesh, owners[locked] if number else owners[:0], _RINGS)[region]

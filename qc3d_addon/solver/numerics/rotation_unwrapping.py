@@ -19,6 +19,7 @@ from .grouped_sums import covariances_by_label, means_by_label, sums_by_label
 from .rising import risen
 from .rotation_forest import RotationForest, relative_angles
 from .rotations import nearest_branch, products, rotation_matrices, rotation_vectors
+from .torn_rotations import closed_tears
 
 # Rotation vectors lose their axis at a full turn, 2 pi; a part that turns further than this gets a twist well before.
 # Triangles count gradually from the first angle to the second.
@@ -48,10 +49,13 @@ class Turning:
     ----------
     swing, twist : (m, 3)
         Rotation vectors, radians.
+    certainty : (m,), optional
+        How certain it is which way round each element turns, 0..1; all 1 by default.
     """
 
     swing: Floats
     twist: Floats
+    certainty: Floats | float = 1.0
 
     def at(self, time: float, change: Floats | float = 0.0) -> Floats:
         """(m, 3, 3) rotations at ``time`` in 0..1; ``change`` (m, 3) is added to the swing's rotation vector."""
@@ -126,6 +130,7 @@ def consistent_turning(
         started = np.where(rests[:, None], nearest_branch(turns, resting), turns)
     forest = forest.rooted(angles)
     vectors = _agreeing_parts(forest, forest.carried(started, nearest_branch), centers, weights, loose)
+    vectors, certainty = closed_tears(forest, vectors, turns, adjacency)
     axes = _principal_axes(vectors, weights, forest.labels)[forest.labels]
     half = 0.5 * np.linalg.norm(turns, axis=1)
     sine_along = 0.5 * np.sinc(half / np.pi) * np.einsum("ki,ki->k", turns, axes)
@@ -134,11 +139,12 @@ def consistent_turning(
     share = sums_by_label(forest.labels, weights * risen(farthest, *_MOST_SWING))
     degree = risen(share / sums_by_label(forest.labels, weights), *_FAIR_SHARE)[forest.labels]
     if not degree.any():
-        return Turning(vectors, no_twist(count))
+        return Turning(vectors, no_twist(count), certainty)
     twist = (degree * phases)[:, None] * axes
     swing = swing_beside(turns, twist)
     partly = (degree < 1.0)[:, None]
-    return Turning(np.where(partly, nearest_branch(swing, (1.0 - degree)[:, None] * vectors), swing), twist)
+    swing = np.where(partly, nearest_branch(swing, (1.0 - degree)[:, None] * vectors), swing)
+    return Turning(swing, twist, certainty)
 
 
 def no_twist(count: int) -> Floats:
@@ -209,7 +215,7 @@ def mean_turn(turns: Floats, adjacency: Ints, weights: Floats) -> Floats:
     for _ in range(_MEAN_STEPS):
         beside = rotation_vectors(mean.T @ rotations)
         rooted = forest.rooted(np.linalg.norm(beside, axis=1))
-        step = shares @ rooted.carried(beside, nearest_branch)
+        step = shares @ closed_tears(rooted, rooted.carried(beside, nearest_branch), beside, adjacency)[0]
         mean = mean @ rotation_matrices(step[None])[0]
         if np.linalg.norm(step) < _MEAN_FOUND:
             break

@@ -42,6 +42,7 @@ from .system import MovingSurface
 from .tangents import tangents_of
 
 ANCHOR_WEIGHT = 5e-5
+_LEAST_CERTAIN = 1e-9  # far below what anchors weigh
 # What travels a hundredth of the size or more is not drawn to its line at all.
 _NO_LINE = (NEARLY_STILL / 1e-2) ** 2
 # Of still vertices, those around which triangles turn further than this come back after a full turn. Half a turn, as of
@@ -122,6 +123,8 @@ class SurfacePath:
         self.rest = -embedding.motion.turn if still.any() else np.zeros(3)
         neighbors = face_adjacency(usable.faces)
         turning = consistent_turning(usable.turns, neighbors, centers, usable.weights, held, self.rest)
+        # What turns half a turn from what is around it tells nothing; something must keep its vertices in place.
+        self.deformation = usable = usable.weighing(np.maximum(turning.certainty, _LEAST_CERTAIN))
         returned = np.zeros(count, dtype=bool)
         if free_after_turns:
             returned[usable.faces[turning.angles_from(self.rest) > _RETURNS]] = True

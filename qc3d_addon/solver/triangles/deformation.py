@@ -72,17 +72,13 @@ class TriangleDeformation:
     rows: Ints
 
     @classmethod
-    def between(
-        cls, key0: Floats, key1: Floats, faces: Ints, shares: Floats | float = 1.0
-    ) -> TriangleDeformation:
+    def between(cls, key0: Floats, key1: Floats, faces: Ints, shares: Floats | float = 1.0) -> TriangleDeformation:
         """Deformation of the usable triangles of ``faces`` (m, 3) from ``key0`` (n, 3) to ``key1`` (n, 3).
 
         What they count is multiplied by ``shares`` (m,).
         """
         double0, double1 = (2.0 * areas(key, faces) for key in (key0, key1))
-        longest0, longest1 = (
-            in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1)
-        )
+        longest0, longest1 = (in_blocks(partial(_longest_among, key, faces), len(faces))[0] for key in (key0, key1))
         usable = (double0 > _least_area(key0, double0, longest0)) & (double1 > _least_area(key1, double1, longest1))
         usable &= _kept(double0 * longest1**2, double1 * longest0**2) > _PRESSED
         faces = faces if usable.all() else faces[usable]
@@ -109,6 +105,10 @@ class TriangleDeformation:
     def spins(self) -> Floats:
         """(m, 2, 2) the in-plane rotations."""
         return _planar_rotations(self.angles)
+
+    def weighing(self, factors: Floats) -> TriangleDeformation:
+        """The same, with weights multiplied by ``factors`` (m,)."""
+        return replace(self, weights=self.weights * factors)
 
     def without_directions(self) -> TriangleDeformation:
         """The same without bases and gradients, which take half of the memory."""

@@ -177,8 +177,7 @@ def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
     for key in keys:
         # Sizes near the ends of the range of floating point give infinities, which are not flat.
         with np.errstate(over="ignore", invalid="ignore"):
-            size = max(float(np.ptp(key, axis=0).max(initial=0.0)), 1e-300)
-            scaled = (key - key[:1]) / size
+            scaled = _in_unit_ball(key)
             joinable &= _flat_and_convex(scaled, quads)
             squares += ((scaled[quads[:, 2]] - scaled[quads[:, 0]]) ** 2).sum(axis=1)
     first, second, squares = first[joinable] % len(faces), second[joinable] % len(faces), squares[joinable]
@@ -192,6 +191,13 @@ def flat_quads(keys: list[Floats], faces: Ints) -> Ints:
         best &= (squares >= (1.0 - _LONGER) * longest[side]) & (times[side] == 1)
     polygons[second[best]] = polygons[first[best]]
     return polygons
+
+
+def _in_unit_ball(key: Floats) -> Floats:
+    """(n, 3) positions (n, 3) around the first one, the farthest of them at the distance 1, however they are turned."""
+    spread = key - key[:1]
+    spread /= max(float(np.abs(spread).max(initial=0.0)), 1e-300)
+    return np.asarray(spread / max(float(np.linalg.norm(spread, axis=1).max(initial=0.0)), 1e-300))
 
 
 def _third(faces: Ints, sides: Ints) -> Ints:

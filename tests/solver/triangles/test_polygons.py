@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qc3d_addon.solver.arrays import Floats, Ints
+from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.triangles.geometry import areas
 from qc3d_addon.solver.triangles.polygons import covering, flat_quads, labels_by_sides
 
@@ -142,3 +143,16 @@ def test_sizes_near_the_ends_of_floating_point(size: float) -> None:
     with np.errstate(all="raise", under="ignore"):
         found = flat_quads([square, square], np.array([[0, 1, 2], [0, 2, 3]]))
     assert len(found) == 2
+
+
+def test_quads_are_the_same_however_the_keys_are_turned() -> None:
+    """Diagonals of two keys count alike: both keys are measured by the same size, whatever their bounding boxes are."""
+    points, faces = box_surface((3, 3, 12), (0.6, 0.6, 4.0))
+    points = points - [0.3, 0.3, 2.0]
+    weights = np.clip(points[:, 2:] / 0.4 + 0.5, 0.0, 1.0)
+    bend = rotation_matrices(np.array([[0.0, np.pi / 2.0, 0.0]]))[0]
+    folded = points + weights**2 * (3.0 - 2.0 * weights) * (points @ bend.T - points)
+    expected = flat_quads([points, folded], faces)
+    for seed in range(5):
+        turn = rotation_matrices(np.random.default_rng(seed).normal(size=(1, 3)))[0]
+        np.testing.assert_array_equal(flat_quads([points @ turn.T, folded @ turn.T], faces), expected)

@@ -23,7 +23,6 @@ import time as clock
 from dataclasses import replace
 from itertools import pairwise
 
-import ipctk
 import numpy as np
 
 from qc3d_addon.solver.arrays import Bools
@@ -130,6 +129,8 @@ def meetings(shapes: Floats, faces: Ints) -> Ints:
     (c, 4) int64
         A vertex and the three of a triangle, or the two ends of both edges; each pair once, however often it meets.
     """
+    import ipctk  # of the extra benchmark; the options are explained without it
+
     corners, edges = np.asarray(faces, dtype=np.int32), unique_edges(sides(faces)).astype(np.int32)
     mesh = ipctk.CollisionMesh(np.asfortranarray(shapes[0]), np.asfortranarray(edges), np.asfortranarray(corners))
     found: set[tuple[int, ...]] = set()

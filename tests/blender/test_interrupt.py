@@ -75,7 +75,8 @@ def test_each_ending_of_the_child_leaves_the_file_as_it_was(
     figure: bpy.types.Object, state: State, temporary: Path, monkeypatch: pytest.MonkeyPatch, line: str, said: str
 ) -> None:
     script = temporary / "child.py"
-    script.write_text(f"import os, signal, sys, time\n{line}\n")
+    # A child first reads that it may begin; what it says before that is forgotten.
+    script.write_text(f"import os, signal, sys, time\nsys.stdin.buffer.readline()\n{line}\n")
     monkeypatch.setattr(child, "CHILD", script)
     before = state()
     with pytest.raises(RuntimeError, match=said):

@@ -58,15 +58,16 @@ class Schedule:
         while self._running:
             done, _ = wait(self._running, _TURN_SECONDS, FIRST_COMPLETED)
             for future in done:
-                self._end(self._running.pop(future), _result(future))
+                job = self._running.pop(future)
+                self._end(job, self._result(future, job))
             if not done and not self._pool.is_there():
                 gone = list(self._running.values())
                 self._running.clear()
                 for job in gone:
-                    self._end(job, Ended.failed(lost(ConnectionError("the scheduler is gone"))))
+                    self._end(job, self._given_up(job, ConnectionError("the scheduler is gone")))
 
     def stop(self, batch: str) -> None:
-        """End the jobs that run; those that have ended meanwhile count as that."""
+        """End the jobs that run; those that ended meanwhile count as that, also if only their records tell."""
         self._pool.stop(batch)
         for future, job in self._running.items():
             if future.done() and not future.cancelled():
@@ -75,7 +76,6 @@ class Schedule:
         begun = {job.number for job in self._running.values()}
         for job in self._jobs:
             if job.number not in self.ended:
-                # Of what was done on another machine, word may not have come yet.
                 told = self._known(job, "done") if job.number in begun else None
                 self._end(job, told or Ended("stopped"), goes_on=False)
 
@@ -85,6 +85,16 @@ class Schedule:
             self._running[self._pool.submit(self._order(job))] = job
         else:
             self._end(job, known)
+
+    def _result(self, future: Future[Ended], job: Job) -> Ended:
+        try:
+            return future.result()
+        except Exception as error:  # whatever a cluster raises when it gives a job up
+            return self._given_up(job, error)
+
+    def _given_up(self, job: Job, error: Exception) -> Ended:
+        """How a job ended of which its place says no more: its record tells whether it was done before."""
+        return self._known(job, "done") or Ended.failed(lost(error))
 
     def _known(self, job: Job, how: HowEnded) -> Ended | None:
         """The end of a job by its record, as one of that kind; None if it has none."""
@@ -105,10 +115,3 @@ class Schedule:
 
     def _following(self, job: Job) -> Iterator[Job]:
         return (other for other in self._jobs if other.after == job.number)
-
-
-def _result(future: Future[Ended]) -> Ended:
-    try:
-        return future.result()
-    except Exception as error:  # whatever a cluster raises when it gives a job up
-        return Ended.failed(lost(error))

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
@@ -15,15 +14,12 @@ import numpy as np
 
 from ...solver.arrays import Floats
 from ...solver.errors import InputError
-from .. import compat
 from ..bake.plan import located
-from ..keys import shape_keys
-from ..keys.control import mute_path, value_path
 from ..keys.sides import whole_of
-from ..kinds import keys_of, present
-from ..store import checks, combined_keys, names
+from ..kinds import keys_of
+from ..store import checks, combined_keys
 from ..store.combined_keys import Combined
-from ..store.mesh_data import key_coordinates, set_key_coordinates
+from . import correction_keys
 from .halves import completed
 from .probe import probed
 
@@ -33,8 +29,6 @@ if TYPE_CHECKING:
     from ...solver.settings import FitOptions
     from ...solver.support.progress import OnProgress
 
-# A correction is close to the product of the values: parabolas through these follow it, and need a key for each pair.
-PLACES = (0.5, 1.0)
 _MOST_KEYS = 3
 
 
@@ -153,18 +147,18 @@ def plan_combination(
     known = combined_keys.read(keys)
     made = {name for one in known for name, _ in one.made}
     own = {name for name, _ in earlier.made} if (earlier := _earlier(known, chosen)) is not None else set()
-    _require_unlocked(keys, own)
+    correction_keys.require_unlocked(keys, own)
     count = len(chosen)
-    grid = np.array(list(product(range(len(PLACES)), repeat=count)))
-    values = np.array(PLACES)
+    grid = np.array(list(product(range(len(correction_keys.PLACES)), repeat=count)))
+    values = np.array(correction_keys.PLACES)
     with probed(obj, chosen, made) as shown:
-        alone = [shown((place * np.eye(count)[key]).tolist()) for key in range(count) for place in PLACES]
+        alone = [shown((place * np.eye(count)[key]).tolist()) for key in range(count) for place in values]
         ends = shown([0.0] * count), shown([1.0] * count)
     with probed(obj, chosen, own) as shown:
         present = [shown(values[places].tolist()) for places in grid]
     mesh = completed(obj, [*ends, *alone])
     base, sculpted, *others = mesh.shapes
-    shapes = np.stack(others).reshape(count, len(PLACES), *base.shape)
+    shapes = np.stack(others).reshape(count, len(correction_keys.PLACES), *base.shape)
     task = Corrections(
         base, shapes, sculpted, grid, values, mesh.faces, mesh.edges, find_order, options or FitOptions()
     )
@@ -184,14 +178,14 @@ def write_combination(plan: CombinationPlan, corrected: Corrected) -> Made:
     keys = keys_of(obj)
     known = combined_keys.read(keys)
     earlier = _earlier(known, plan.chosen)
-    _require_unlocked(keys, {name for name, _ in earlier.made} if earlier is not None else set())
+    correction_keys.require_unlocked(keys, {name for name, _ in earlier.made} if earlier is not None else set())
     corrections = {}
     for places, shape, shown in zip(plan.task.places, corrected.shapes, plan.shown, strict=True):
         values = tuple(float(plan.task.values[places[key]]) for key in corrected.order)
         if not (corrected.is_sculpted and min(values) == 1.0):
             corrections[values] = plan.mesh.own(shape) - shown
     named = tuple(plan.chosen[number] for number in corrected.order)
-    combined = _write(obj, named, dict(sorted(corrections.items())), earlier, known)
+    combined = correction_keys.write(obj, named, dict(sorted(corrections.items())), earlier, known)
     return Made(combined, corrected.is_sculpted, corrected.crossings, corrected.off)
 
 
@@ -221,18 +215,6 @@ def _earlier(known: Sequence[Combined], chosen: Sequence[str]) -> Combined | Non
     return next((one for one in known if set(one.keys) == set(chosen)), None)
 
 
-def remove(obj: bpy.types.Object, combined: Combined) -> list[str]:
-    """Remove the correction keys of a combination; sentences about those that stay because drivers read them."""
-    keys = keys_of(obj)
-    _require_unlocked(keys, [name for name, _ in combined.made])
-    left = [one for one in combined_keys.read(keys) if one.keys != combined.keys]
-    notes = shape_keys.remove_keys(obj, [keys.key_blocks[name] for name, _ in combined.made])
-    with ExitStack() as undo:
-        combined_keys.write(keys, left, undo)
-        undo.pop_all()
-    return notes
-
-
 def _require(obj: bpy.types.Object, chosen: Sequence[str]) -> None:
     keys = keys_of(obj)
     if not 2 <= len(chosen) <= _MOST_KEYS:
@@ -258,79 +240,3 @@ def _require(obj: bpy.types.Object, chosen: Sequence[str]) -> None:
             f"'{chosen[0]}' and '{chosen[1]}' add up to '{whole}', so there is nothing to correct; Split Key Left and "
             "Right gives them its in-betweens."
         )
-
-
-def _require_unlocked(keys: bpy.types.Key, names_: Sequence[str] | set[str]) -> None:
-    for name in names_:
-        if keys.key_blocks[name].lock_shape:
-            raise InputError(f"Shape key '{name}' of an earlier combination is locked; unlock it first.")
-
-
-def _write(
-    obj: bpy.types.Object,
-    named: tuple[str, ...],
-    corrections: dict[tuple[float, ...], Floats],
-    earlier: Combined | None,
-    known: list[Combined],
-) -> Combined:
-    """Write the correction keys, all of them or, if anything fails, none. Existing ones keep their names."""
-    keys = keys_of(obj)
-    relative = keys.key_blocks[named[0]].relative_key
-    start = key_coordinates(obj, relative.name)
-    # The earlier time's values in the order of this one.
-    there = {}
-    if earlier is not None:
-        own = [earlier.keys.index(name) for name in named]
-        there = {tuple(places[number] for number in own): name_of for name_of, places in earlier.made}
-    active = obj.active_shape_key_index
-    with ExitStack() as undo:
-        made = []
-        for places, correction in corrections.items():
-            if places in there:
-                key = keys.key_blocks[there.pop(places)]
-                undo.callback(set_key_coordinates, key, key_coordinates(obj, key.name))
-            else:
-                key = shape_keys.new_key(obj, names.combination_name(named, places), relative, undo)
-            set_key_coordinates(key, (start + correction).astype(np.float32))
-            _drive(keys, key, named, places)
-            made.append((key.name, places))
-        combined = Combined(named, tuple(made), combined_keys.digests_of(keys, named))
-        others = [one for one in known if one is not earlier]
-        combined_keys.write(keys, [*others, combined], undo)
-        undo.pop_all()
-    shape_keys.remove_keys(obj, [keys.key_blocks[name] for name in there.values()])
-    obj.active_shape_key_index = active
-    keys.update_tag()
-    return combined
-
-
-def _drive(keys: bpy.types.Key, key: bpy.types.ShapeKey, named: Sequence[str], places: Sequence[float]) -> None:
-    """Drive a correction key by the values of the combined keys; it is 0 if one of these is muted.
-
-    The expression is simple enough for Blender to evaluate it without the permission that scripts need.
-    """
-    path = value_path(key.name)
-    curve = None if keys.animation_data is None else keys.animation_data.drivers.find(path)
-    curve = compat.new_driver(keys, path) if curve is None else curve
-    driver = present(curve.driver)
-    driver.type = 'SCRIPTED'
-    while driver.variables:
-        driver.variables.remove(driver.variables[0])
-    factors = []
-    for number, (name, place) in enumerate(zip(named, places, strict=True)):
-        for letter, path_of in (("v", value_path), ("m", mute_path)):
-            variable = driver.variables.new()
-            variable.name = f"{letter}{number}"
-            target = variable.targets[0]
-            target.id_type, target.id, target.data_path = 'KEY', keys, path_of(name)
-        factors += [_cardinal(f"v{number}", place), f"(1-m{number})"]
-    driver.expression = "*".join(factors)
-    driver.is_valid = True
-
-
-def _cardinal(variable: str, place: float) -> str:
-    """The Lagrange polynomial that is 1 at one place and 0 at the others and at 0, as an expression."""
-    others = [other for other in (0.0, *PLACES) if other != place]
-    scale = 1.0 / float(np.prod([place - other for other in others]))
-    parts = [variable if other == 0.0 else f"({variable}-{other:g})" for other in others]
-    return "*".join([f"{scale:.9g}", *parts])

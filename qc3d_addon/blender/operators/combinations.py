@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import InputError, QC3DError
 from .. import compat
-from ..combinations import combine, verdicts
+from ..combinations import combine, correction_keys, verdicts
 from ..kinds import keys_of, present
 from ..store import checks, combined_keys
 from .child_work import ChildWork
@@ -144,6 +144,6 @@ class QC3D_OT_remove_combination(CombinationWork, bpy.types.Operator):
         chosen = next((one for one in combined_keys.read(keys_of(obj)) if one.label == self.label), None)
         if chosen is None:
             raise InputError(f"There is no combination '{self.label}'; choose one from the panel.")
-        for note in combine.remove(obj, chosen):
+        for note in correction_keys.remove(obj, chosen):
             self.report({'WARNING'}, note)
         yield f"The combination of {chosen.label} was removed."

@@ -115,8 +115,7 @@ class SurfacePath:
         faces, (triangles, shares) = embedding.pair.faces, embedding.pair.covering
         if count < len(self.group):
             faces, triangles = self.group[faces], self.group[triangles]
-        self.deformation = TriangleDeformation.between(self._key0, key1, triangles, shares)
-        usable = self.deformation
+        usable = TriangleDeformation.between(self._key0, key1, triangles, shares)
         held = still[usable.faces].any(axis=1)
         centers = self._key0[usable.faces].mean(axis=1)
         # What stays in place turns back beside a motion that was taken out.
@@ -124,7 +123,7 @@ class SurfacePath:
         neighbors = face_adjacency(usable.faces)
         turning = consistent_turning(usable.turns, neighbors, centers, usable.weights, held, self.rest)
         # What turns half a turn from what is around it tells nothing; something must keep its vertices in place.
-        self.deformation = usable = usable.weighing(np.maximum(turning.certainty, _LEAST_CERTAIN))
+        usable = usable.weighing(np.maximum(turning.certainty, _LEAST_CERTAIN))
         returned = np.zeros(count, dtype=bool)
         if free_after_turns:
             returned[usable.faces[turning.angles_from(self.rest) > _RETURNS]] = True
@@ -132,7 +131,7 @@ class SurfacePath:
         self.returns = bool((embedding.still[self.vertices] & returned).any())
         self.still = still[self.group]
         self._free = ~still
-        self._springs = edges_without_triangle(triangles, self.group[embedding.pair.edges], self.deformation.faces)
+        self._springs = edges_without_triangle(triangles, self.group[embedding.pair.edges], usable.faces)
         self._lengths = [edge_lengths(key, self._springs) for key in (self._key0, key1)]
         labels = vertex_components(np.concatenate([unique_edges(sides(faces)), self._springs]), count)
         self.components = labels[self.group]
@@ -154,7 +153,7 @@ class SurfacePath:
         )
         self._joints = Joints(self._key0, key1, ~self._free, weights, labels, turns)
         self._rigid = RigidParts(self._key0, key1, ~self._free, weights, labels)
-        area = float(self.deformation.weights.sum())
+        area = float(usable.weights.sum())
         density = area / float((np.ptp(self._key0, axis=0) ** 2).sum()) if area > 0.0 else 1.0
         self._anchor_weights = ANCHOR_WEIGHT * density * weights
         # What hardly travels is drawn to its straight line, in the limit as if it were still.

@@ -101,6 +101,16 @@ def box_surface(cells: tuple[int, int, int], size: tuple[float, float, float]) -
     return points, faces
 
 
+def sheet(cells: tuple[int, int], size: tuple[float, float]) -> tuple[Floats, Ints]:
+    """A flat grid of quads in the xy plane, around the origin: the lower side of a box."""
+    box, faces = box_surface((*cells, 1), (*size, 1.0))
+    low = np.flatnonzero(box[:, 2] == 0.0)
+    number = np.full(len(box), -1)
+    number[low] = np.arange(len(low))
+    kept = number[faces]
+    return box[low], kept[(kept >= 0).all(axis=1)]
+
+
 def twisted(points: Floats, angle: float) -> Floats:
     """Points turned about the z axis, by 0 at their lowest z to ``angle`` (radians) at their highest."""
     height = points[:, 2] - points[:, 2].min()

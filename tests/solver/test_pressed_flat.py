@@ -11,7 +11,7 @@ import qc3d_addon as qc3d
 from qc3d_addon.solver.arrays import Floats, Ints
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 
-from .meshes import box_surface, enclosed_volume, icosphere
+from .meshes import box_surface, enclosed_volume, icosphere, sheet
 
 pytestmark = pytest.mark.usefixtures("coarse_volume")
 
@@ -32,15 +32,6 @@ def off_line(key0: Floats, key1: Floats, faces: Ints) -> float:
     return float(np.linalg.norm(bake.frames - lines, axis=2).max() / np.linalg.norm(np.ptp(key0, axis=0)))
 
 
-def plane() -> tuple[Floats, Ints]:
-    box, faces = box_surface((5, 5, 1), (1.0, 1.0, 1.0))
-    low = np.flatnonzero(box[:, 2] == 0.0)
-    number = np.full(len(box), -1)
-    number[low] = np.arange(len(low))
-    kept = number[faces]
-    return box[low], kept[(kept >= 0).all(axis=1)]
-
-
 @pytest.mark.parametrize("left", [0.1, 1e-3, 1e-6, 0.0])
 @pytest.mark.parametrize(("points", "faces"), [(BOX, BOX_FACES), (BALL, BALL_FACES)], ids=["box", "ball"])
 def test_a_box_and_a_ball_that_are_pressed_flat(points: Floats, faces: Ints, left: float) -> None:
@@ -52,7 +43,7 @@ def test_a_box_and_a_ball_that_are_pressed_flat(points: Floats, faces: Ints, lef
 
 @pytest.mark.parametrize("left", [1e-3, 1e-6, 0.0])
 def test_a_plane_that_shrinks_to_a_line(left: float) -> None:
-    points, faces = plane()
+    points, faces = sheet((5, 5), (1.0, 1.0))
     assert off_line(points, np.stack([0.5 + left * (points[:, 0] - 0.5), *points[:, 1:].T], axis=1), faces) < 2e-4
 
 

@@ -20,23 +20,13 @@ from qc3d_addon.solver.keys.keypair import KeyPair
 from qc3d_addon.solver.numerics.rotations import rotation_matrices
 from qc3d_addon.solver.triangles.topology import sides, unique_edges
 
-from .meshes import bent, box_surface, icosphere
+from .meshes import bent, box_surface, icosphere, sheet
 
 pytestmark = [pytest.mark.usefixtures("coarse_volume"), pytest.mark.slow]
 
 SEEDS = (1, 2)
 VISIBLE = 0.0025  # of an edge's length
 Keys = tuple[Floats, Floats, Ints]
-
-
-def sheet(across: int, along: int, width: float, height: float) -> tuple[Floats, Ints]:
-    """A flat grid of quads in the xy plane."""
-    box, faces = box_surface((across, along, 1), (width, height, 1.0))
-    low = np.flatnonzero(box[:, 2] == 0.0)
-    number = np.full(len(box), -1)
-    number[low] = np.arange(len(low))
-    kept = number[faces]
-    return box[low], kept[(kept >= 0).all(axis=1)]
 
 
 def curled(points: Floats, curvature: float) -> Floats:
@@ -46,20 +36,20 @@ def curled(points: Floats, curvature: float) -> Floats:
 
 def pages(random: np.random.Generator) -> Keys:
     """A sheet that is curled one way, then the other."""
-    points, faces = sheet(14, 6, 2.0, 1.0)
+    points, faces = sheet((14, 6), (2.0, 1.0))
     curvature = random.uniform(0.5, 2.0)
     return curled(points, curvature), curled(points, -curvature), faces
 
 
 def folds(random: np.random.Generator) -> Keys:
-    points, faces = sheet(10, 6, 2.0, 1.0)
+    points, faces = sheet((10, 6), (2.0, 1.0))
     angle, beyond = random.uniform(1.0, 2.9), np.maximum(points[:, 0] - 1.0, 0.0)
     folded = np.minimum(points[:, 0], 1.0) + beyond * np.cos(angle)
     return points, np.stack([folded, points[:, 1], beyond * np.sin(angle)], axis=1), faces
 
 
 def flags(random: np.random.Generator) -> Keys:
-    points, faces = sheet(12, 8, 1.5, 1.0)
+    points, faces = sheet((12, 8), (1.5, 1.0))
     keys = []
     for _ in range(2):
         waves, phases = random.normal(scale=3.0, size=(3, 2)), random.uniform(0.0, 6.0, 3)

@@ -15,17 +15,15 @@ if TYPE_CHECKING:
 
 def opened_seams(pairs: Mapping[Ends, KeyPair]) -> list[str]:
     """A sentence for each key that does not have vertices of the seam on a mirror plane where the key beside it has."""
-    from ...solver.triangles.topology import sides
+    from ...solver.triangles.topology import open_loops
 
     sentences = []
     for names, pair in pairs.items():
         if not pair.planes:
             continue
         own = pair.own
-        count_of_vertices = len(own.key0)
-        codes, uses = np.unique(sides(own.faces) @ [count_of_vertices, 1], return_counts=True)
-        is_border = np.zeros(count_of_vertices, dtype=bool)
-        is_border[np.stack(np.divmod(codes[uses == 1], count_of_vertices))] = True
+        is_border = np.zeros(len(own.key0), dtype=bool)
+        is_border[open_loops(own.faces)[0]] = True
         for plane in pair.planes:
             first, second = (np.abs(plane.heights(key)) <= plane.reach for key in (own.key0, own.key1))
             for on, off, there in ((*names, first & ~second), (*names[::-1], second & ~first)):

@@ -64,18 +64,19 @@ def closed_tears(forest: RotationForest, vectors: Floats, turns: Floats, adjacen
     >>> np.degrees(closed_tears(forest, torn, turns, adjacency)[0][:, 2]).round(6) + 0.0
     array([  0.,  45.,  85., 130.,   0., -85., 220., 130.])
     """
-    left = _torn_parts(forest, vectors, adjacency)
+    torn = _disagreeing(vectors, adjacency)
+    left = _parts_with(torn, forest)
     result, apart = vectors, np.zeros(len(turns))
     for strength in _STRENGTHS:
         if not left.any():
             break
-        ends = adjacency[_disagreeing(vectors, adjacency) & left[forest.labels[adjacency[:, 0]]]]
-        guide = _smoothed(turns, adjacency, ends.ravel(), strength)
+        ends = torn[left[forest.labels[torn[:, 0]]]].ravel()
+        guide = _smoothed(turns, adjacency, ends, strength)
         guide[forest.roots] = nearest_branch(guide[forest.roots], vectors[forest.roots])
         away = np.ones(len(turns))
         away[forest.roots] = 0.0
         guide = RotationForest(guide, adjacency).rooted(away).carried(guide, nearest_branch)
-        closed = left & ~_torn_parts(forest, guide, adjacency)
+        closed = left & ~_parts_with(_disagreeing(guide, adjacency), forest)
         inside = closed[forest.labels]
         result = np.where(inside[:, None], nearest_branch(turns, guide), result)
         apart = np.where(inside, relative_angles(turns, guide), apart)
@@ -83,20 +84,20 @@ def closed_tears(forest: RotationForest, vectors: Floats, turns: Floats, adjacen
     return result, 1.0 - risen(apart, *_APART)
 
 
-def _disagreeing(vectors: Floats, adjacency: Ints) -> Bools:
-    """(k,) whether neighbors are on different branches."""
+def _disagreeing(vectors: Floats, adjacency: Ints) -> Ints:
+    """(c, 2) those neighbors that are on different branches."""
     first, second = vectors[adjacency[:, 0]], vectors[adjacency[:, 1]]
-    differ = np.asarray(((first - second) ** 2).sum(axis=1) > np.pi**2)  # nearer ones are on the same branch
-    first, second = first[differ], second[differ]
-    differ[differ] = np.abs(nearest_branch(first, second) - first).max(axis=1, initial=0.0) > np.pi
-    return differ
+    far = np.flatnonzero(((first - second) ** 2).sum(axis=1) > np.pi**2)  # nearer ones are on the same branch
+    first, second = first[far], second[far]
+    other = np.abs(nearest_branch(first, second) - first).max(axis=1, initial=0.0) > np.pi
+    return np.asarray(adjacency[far[other]])
 
 
-def _torn_parts(forest: RotationForest, vectors: Floats, adjacency: Ints) -> Bools:
-    """(parts,) whether any neighbors in each part are on different branches."""
-    torn = np.zeros(len(forest.roots), dtype=bool)
-    torn[forest.labels[adjacency[_disagreeing(vectors, adjacency), 0]]] = True
-    return torn
+def _parts_with(neighbors: Ints, forest: RotationForest) -> Bools:
+    """(parts,) whether any of these neighbors (c, 2) are in each part."""
+    found = np.zeros(len(forest.roots), dtype=bool)
+    found[forest.labels[neighbors[:, 0]]] = True
+    return found
 
 
 def _smoothed(turns: Floats, adjacency: Ints, tears: Ints, strength: float) -> Floats:
